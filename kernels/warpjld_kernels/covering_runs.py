@@ -1,8 +1,8 @@
-"""The covering formula over runs of vertices that share their joints and rotations.
+"""The covering formula over runs of vertices that use the same joints and rotations.
 
-Scalar kernels are compiled to scalar code on the CPU, and chains of tile operations go through memory at every step.
-So the arithmetic is one function of portable C++ on vectors of lanes that stay in registers; on a GPU a vector is one
-number and neighbouring threads take neighbouring vertices.
+Warp compiles scalar kernels to scalar code on the CPU, and chains of tile operations go through memory at every step.
+So the arithmetic is one function of portable C++ on SIMD vectors that stay in registers; on a GPU a vector is one
+number, and neighbouring threads compute neighbouring vertices.
 """
 
 import warp as wp
@@ -12,15 +12,15 @@ from warpjld_kernels.lanes import VECTORISED, prelude
 wp.set_module_options(VECTORISED)
 
 CPU_LANES = 32
-"""Vertices of a tile, which one CPU thread index computes; a run has at least as many. On a GPU it is 1."""
+"""Vertices of a tile, which one thread index computes on the CPU; a run has at least as many. On a GPU it is 1."""
 
 CPU_FRAMES = 8
-"""Frames computed one after another for the same vertices, while their coefficients are in the first-level cache."""
+"""Frames computed in turn for the same vertices, while their coefficients are in the first-level cache."""
 
 RUN_FIELDS = 8
 """Columns of the run table: first lane, length, first coefficient, first slot, joints, rotations, scales, muscles."""
 
-# sums of four rows (a rotation's) and what is added to them fit sixteen registers of eight floats
+# the four sums of a rotation's components and their addends fit sixteen registers of eight floats
 _LANES = 16
 
 
@@ -72,7 +72,7 @@ _LANES = 16
             dz += ROW(c + 2 * length) * s;
         }}
 
-        // d + 2 q × (q × d + w d) / |q|²: the blend need not be normalised first
+        // d + 2 q × (q × d + w d) / |q|²: valid for a blend q that is not normalised
         const Floats twice = 2.0f / (qx * qx + qy * qy + qz * qz + qw * qw + 1e-20f);
         const Floats tx = qy * dz - qz * dy + qw * dx;
         const Floats ty = qz * dx - qx * dz + qw * dy;
@@ -140,11 +140,11 @@ def deform_runs(
 
     Launched over blocks of frames and tiles of vertices.
 
-    ``slots`` of a run give the columns of the palette where its joints (3 values), rotations (4), scales s (1) and
-    muscles m (1) begin; ``coefficients`` of a run are rows of its length: one a joint, one a rotation, one a scale,
-    three for d, three a muscle. ``tiles`` hold a run and its lane where the tile begins. The last tile of a run is
-    moved back to its end: some vertices are computed twice, none of another run. With ``scatter`` a GPU writes vertices
-    to the places that ``order`` gives; otherwise they are written one after another.
+    ``slots`` of a run give the first palette columns of its joints (3 values), rotations (4), scales s (1) and muscles
+    m (1); ``coefficients`` of a run are rows of its length: one per joint, rotation and scale, three for d, and three
+    per muscle. ``tiles`` hold a run and the lane within it where the tile begins. The last tile of a run overlaps the
+    one before, so that it ends with the run: some vertices are computed twice. With ``scatter`` a GPU writes vertices
+    to the rows given by ``order``; otherwise they are written in the order of lanes.
     """
     block, tile = wp.tid()
     first = block * block_frames
@@ -164,11 +164,11 @@ def deform_runs(
     float* to = (float*)points.data + 3 * size_t(frame) * count;
     const int* at = lane.data;
     int i = 0;
-    // whole vectors that go past the caches want an address that divides by their size
+    // non-temporal stores of vectors need aligned addresses
     for (; i < count && (size_t(to + 3 * i) & 15); ++i)
         for (int k = 0; k < 3; ++k) to[3 * i + k] = from[3 * at[i] + k];
     for (; i + 4 <= count; i += 4) {
-        // each reads one number too many, which the array has
+        // each load reads one float beyond the vertex, for which the array has room
         const Four a = *(const Loose*)(from + 3 * at[i]), b = *(const Loose*)(from + 3 * at[i + 1]);
         const Four c = *(const Loose*)(from + 3 * at[i + 2]), d = *(const Loose*)(from + 3 * at[i + 3]);
         Four* out = (Four*)(to + 3 * i);
@@ -193,9 +193,9 @@ def gather_row(
 def gather_lanes(
     packed: wp.array2d(dtype=wp.vec3), lane: wp.array(dtype=wp.int32), points_out: wp.array2d(dtype=wp.vec3)
 ):
-    """Vertices from the lanes they were computed in, a frame a thread; for the CPU.
+    """Copy vertices from the order of lanes to that of the surface, one frame per thread, on the CPU.
 
-    Reading them from a buffer that the caches hold and writing rows from end to end is quicker than writing vertices
-    each to its place in memory. A row of ``packed`` has at least one vertex more than there are lanes.
+    Gathering from a buffer in cache and writing rows sequentially is faster than scattering vertices in memory. A row
+    of ``packed`` has at least one vertex more than there are lanes.
     """
     gather_row(wp.tid(), packed, lane, points_out)

@@ -1,11 +1,11 @@
-"""Coefficients of the JLD operators at every vertex, before diffusion: they depend on parameters, not on the pose."""
+"""Coefficients of the JLD operators at every vertex before diffusion, as functions of the animator's parameters."""
 
 import warp as wp
 
 from warpjld_kernels.coefficients import muscle_profile, rotation_weights, rounding
 from warpjld_kernels.lanes import VECTORISED
 
-# compiled as what deforms is, so that both take the same precompiled header, which costs more than either
+# the same options as the deforming kernels, so that both use one precompiled header, which takes longest to compile
 wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
 
@@ -19,7 +19,7 @@ def operator_coefficients(
     peak: float,
     exponents: wp.vec2,
 ):
-    """Weights of an operator's three rotations, its two roundings and its muscle, for amplitudes of one (R58–R65)."""
+    """Weights of an operator's three rotations, two roundings and muscle at a vertex, for unit amplitudes (R58–R65)."""
     profile = muscle_profile(ratio, peak, exponents[0], exponents[1])
     return (
         weight * rotation_weights(ratio, side, proximity[0], proximity[1]),
@@ -30,7 +30,7 @@ def operator_coefficients(
 
 @wp.kernel
 def operator_fields(
-    # places
+    # vertices' coordinates on their segments
     ends: wp.array2d(dtype=wp.int32),
     muscular: wp.array(dtype=float),
     segment: wp.array2d(dtype=wp.int32),
@@ -46,7 +46,7 @@ def operator_fields(
     rounding_out: wp.array2d(dtype=wp.vec2),
     muscle_out: wp.array2d(dtype=float),
 ):
-    """Coefficients per operator of a vertex. See ``warpjld.covering.binding.Anchors`` for the places."""
+    """Coefficients of each vertex and operator. Inputs as in ``warpjld.covering.binding.Anchors``."""
     v, k = wp.tid()
     s = segment[v, k]
     p = ends[s, 0]

@@ -1,4 +1,4 @@
-"""Coefficients of the JLD operators with their derivatives: apart, since only calibration wants to wait for those."""
+"""Differentiable coefficients of the JLD operators, in a module of their own that is compiled only where needed."""
 
 import warp as wp
 
@@ -9,7 +9,7 @@ wp.set_module_options({"max_unroll": 1, "enable_backward": True})
 
 @wp.kernel
 def operator_fields_with_gradient(
-    # places
+    # vertices' coordinates on their segments
     ends: wp.array2d(dtype=wp.int32),
     muscular: wp.array(dtype=float),
     segment: wp.array2d(dtype=wp.int32),

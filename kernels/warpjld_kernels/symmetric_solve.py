@@ -1,18 +1,18 @@
-"""Solving with a sparse factorisation L D Lᵀ for several right-hand sides at once, for the CPU.
+"""Triangular solves with a sparse factorisation L D Lᵀ for several right-hand sides at once, on the CPU.
 
-A factor is larger than the caches, and reading it is what takes the time: each entry, once read, serves a vector of
-right-hand sides that lie side by side.
+The factor does not fit into the caches, so solves are bound by memory bandwidth: each entry, once read, is used for a
+vector of adjacent right-hand sides.
 """
 
 import warp as wp
 
 from warpjld_kernels.lanes import VECTORISED
 
-# compiled as what deforms is, so that both take the same precompiled header, which costs more than either
+# the same options as the deforming kernels, so that both use one precompiled header, which takes longest to compile
 wp.set_module_options(VECTORISED)
 
 TOGETHER = 8
-"""Right-hand sides that a thread takes at once."""
+"""Right-hand sides solved together by a thread."""
 
 
 @wp.func_native(

@@ -1,4 +1,4 @@
-"""Volume that a displacement took from a part, given back around where it was taken."""
+"""Volume preservation after a displacement: the volume taken from a part bulges around the displaced region."""
 
 import warp as wp
 
@@ -7,28 +7,28 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 def measure_displaced(
-    # frame: before and after, normals as long as a third of the area around
+    # frame: positions before and after, normals of the length of the vertex's area
     before: wp.array(dtype=wp.vec3),
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     part: wp.array(dtype=wp.int32),
-    heeded: wp.array(dtype=wp.int32),
+    sample_count: wp.array(dtype=wp.int32),
     give: wp.array(dtype=float),
-    # rows of a smoothing
+    # smoothing matrix in CSR layout
     first: wp.array(dtype=wp.int32),
     column: wp.array(dtype=wp.int32),
     value: wp.array(dtype=float),
-    # out, by part: volume lost, and volume of a bulge of height ``ring``
+    # out: by vertex the profile of the bulge; by part the volume lost, and the volume of a bulge of height ``ring``
     ring_out: wp.array(dtype=float),
     lost_out: wp.array(dtype=float),
     room_out: wp.array(dtype=float),
 ):
-    """Where a bulge goes: what the smoothed size of the displacement is beyond itself, so beside it; in parts that
-    something was displaced in or next to."""
+    """Profile of the bulge, max(smoothed |displacement| − |displacement|, 0), which is positive beside the displaced
+    region, and volumes; in parts that have samples."""
     v = wp.tid()
     k = part[v]
     ring_out[v] = 0.0
-    if heeded[k] > 0:
+    if sample_count[k] > 0:
         shift = points[v] - before[v]
         around = float(0.0)
         for i in range(first[v], first[v + 1]):
@@ -53,6 +53,7 @@ def bulge(
     # in and out
     points: wp.array(dtype=wp.vec3),
 ):
+    """Move vertices along their normals so that the lost volume is restored, by at most ``most`` thicknesses."""
     v = wp.tid()
     k = part[v]
     if ring[v] > 0.0 and room[k] > 0.0:

@@ -1,18 +1,20 @@
-"""The two sides of a bent joint parted at the plane in which they meet."""
+"""Separation of the two sides of a bent joint at the bisecting plane in which they meet."""
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-ROOM = wp.constant(0.25)  # thicknesses
+ROOM = wp.constant(0.25)  # margin, in thicknesses, within which vertices before the plane are considered too
 
 
 @wp.struct
 class Creases:
-    """Vertices near the planes of joints, and how thick the flesh is at each plane.
+    """Vertices near the bisecting planes of joints, as ``warpjld.touch.creases.Creases``.
 
-    Of every vertex that a joint may press its number and its first entry, one more at the end. Of every entry the
-    plane, the distance from it at rest, how much it counts, and what is opposite: three vertices and their shares.
+    ``vertex`` and ``first`` give the index and the first entry of every vertex that a joint may push, with one more
+    ``first`` at the end. Every entry has its plane ``crease``, the signed distance ``height`` from it at rest [m], its
+    ``weight``, and the ``opposite`` point as three vertices with weights ``share``. ``size`` is the thickness of the
+    flesh at every plane [m].
     """
 
     vertex: wp.array(dtype=wp.int32)
@@ -27,7 +29,7 @@ class Creases:
 
 @wp.func
 def across(creases: Creases, entry: int, frame: int, points: wp.array2d(dtype=wp.vec3)) -> wp.vec3:
-    """What is opposite."""
+    """The point opposite to a vertex: weighted mean of three vertices of the other side [m]."""
     out = wp.vec3(0.0, 0.0, 0.0)
     for k in range(3):
         out += creases.share[entry][k] * points[frame, creases.opposite[entry][k]]
@@ -36,8 +38,8 @@ def across(creases: Creases, entry: int, frame: int, points: wp.array2d(dtype=wp
 
 @wp.func
 def counts(creases: Creases, entry: int, r: wp.vec3, n: wp.vec3) -> float:
-    """How much an entry counts that is so far from what is opposite to it: they have passed through one another only
-    where they are still beside one another."""
+    """Weight of an entry at offset r from its opposite point, n the plane's normal: it falls to zero with tangential
+    distance, since two sides overlap only where they still face each other."""
     beside = wp.length(r - wp.dot(r, n) * n) / creases.size[creases.crease[entry]]
     return creases.weight[entry] * wp.clamp(2.0 - 2.0 * beside, 0.0, 1.0)
 
@@ -45,18 +47,19 @@ def counts(creases: Creases, entry: int, r: wp.vec3, n: wp.vec3) -> float:
 @wp.kernel
 def measure_creases(
     creases: Creases,
-    # normals of the planes in every frame, and how much they count: a joint that is hardly bent presses nothing
+    # normals of the planes in every frame, and their weights, 0 for joints that are hardly bent
     normal: wp.array2d(dtype=wp.vec3),
     bent: wp.array2d(dtype=float),
     points: wp.array2d(dtype=wp.vec3),
     share: float,
     kept: float,
-    # out: whether a vertex may be pushed at all, with room for what pushing others makes of it; how far it has passed
-    # through what is opposite to it; and of every plane the farthest, in parts of what both sides can give
+    # out: whether a vertex may have to be pushed, with a margin for the effect of pushing others; its overlap with the
+    # opposite side [m]; and the largest overlap at every plane, relative to what both sides can yield
     near_out: wp.array2d(dtype=wp.int32),
     overlap_out: wp.array2d(dtype=float),
     deepest_out: wp.array2d(dtype=float),
 ):
+    """Overlap of every vertex with the opposite side of its joints."""
     frame, row = wp.tid()
     v = creases.vertex[row]
     most = float(0.0)
@@ -87,7 +90,7 @@ def push_creases(
     near: wp.array2d(dtype=wp.int32),
     overlap: wp.array2d(dtype=float),
     deepest: wp.array2d(dtype=float),
-    # rows of a smoothing
+    # smoothing matrix in CSR layout
     row_first: wp.array(dtype=wp.int32),
     column: wp.array(dtype=wp.int32),
     value: wp.array(dtype=float),
@@ -101,10 +104,10 @@ def push_creases(
     pushed_out: wp.array(dtype=wp.int32),
     shift_out: wp.array2d(dtype=wp.vec3),
 ):
-    """How far every vertex is pushed from what is opposite to it, each side by half.
+    """Displacement of every vertex away from its opposite point, half of the separation needed.
 
-    They are to be apart by a little, and as far again as they have passed through one another around, but by no more
-    than a share of how far they are at rest.
+    The separation aimed at is a small distance plus a multiple of the smoothed overlap, but no more than a share of the
+    distance at rest.
     """
     frame, row = wp.tid()
     v = creases.vertex[row]
@@ -136,7 +139,7 @@ def push_creases(
 
 @wp.kernel
 def move_smoothly(
-    # vertices that a smoothing reaches from those that are pushed
+    # vertices with non-zero smoothed shifts
     vertex: wp.array(dtype=wp.int32),
     row_first: wp.array(dtype=wp.int32),
     column: wp.array(dtype=wp.int32),
@@ -146,7 +149,7 @@ def move_smoothly(
     # in and out
     points: wp.array2d(dtype=wp.vec3),
 ):
-    """Add smoothed shifts; what has none stays bit for bit."""
+    """Add smoothed shifts; vertices without one keep their exact values."""
     frame, row = wp.tid()
     v = vertex[row]
     total = wp.vec3(0.0, 0.0, 0.0)

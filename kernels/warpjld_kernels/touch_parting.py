@@ -1,4 +1,4 @@
-"""Vertices moved to their own side of the surface in which two parts are to meet."""
+"""Separation of overlapping parts: vertices are moved to their side of the surface in which two parts shall meet."""
 
 import warp as wp
 
@@ -7,14 +7,14 @@ from warpjld_kernels.touch_samples import Samples
 
 wp.set_module_options({"enable_backward": False})
 
-NEARLY = wp.constant(0.6)  # of the deepest: what is that deep may have it near
-HOLDS = wp.constant(4.0)  # how soon what is parted in part holds as what is parted in full does
+NEARLY = wp.constant(0.6)  # share of the deepest probe's depth above which vertices near a probe are tested too
+HOLDS = wp.constant(4.0)  # factor of a pair's separated share in the weight of its planes, up to a weight of 1
 
 
 @wp.kernel
 def fade_pairs(
     parts: Parts,
-    # by pairs of parts, before anything was parted
+    # by pairs of parts, before separation
     deepest: wp.array2d(dtype=float),
     full: float,
     none: float,
@@ -22,8 +22,8 @@ def fade_pairs(
     # out
     shown_out: wp.array2d(dtype=float),
 ):
-    """How much of the overlaps of two parts is parted, by how deep they and those next to them lie in one another at
-    most. What was no overlap before anything was parted is none later: what just was one counts for little."""
+    """Share of the overlap of two parts that is separated: it fades out with the largest depth of them and of their
+    neighbours. Pairs that did not overlap before separation get 0, with a smooth transition at small depths."""
     own, other = wp.tid()
     was = wp.max(deepest[own, other], deepest[other, own])
     shown = float(0.0)
@@ -40,32 +40,33 @@ def fade_pairs(
 
 
 @wp.kernel
-def choose_heard(
-    # by pairs of parts, as far as a few vertices have told
+def choose_pair_weights(
+    # by pairs of parts, from the probes
     deepest: wp.array2d(dtype=float),
     few: float,
     none: float,
     # out
-    some_out: wp.array2d(dtype=float),
-    all_out: wp.array2d(dtype=float),
+    spaced_out: wp.array2d(dtype=float),
+    others_out: wp.array2d(dtype=float),
     deep_out: wp.array2d(dtype=float),
 ):
-    """How much vertices count that are some way apart, and all the others; and what is nearly as deep as the deepest.
+    """Weights, for each pair of parts, of the samples of spaced vertices and of all other vertices; and the depth at a
+    probe above which vertices near it are tested in any case.
 
-    What lies too deep in one another for anything to be parted need not be asked further; where much lies inside, what
-    is some way apart says enough.
+    Pairs that lie too deep inside each other to be separated are not sampled further; where the overlap is large,
+    spaced vertices suffice.
     """
     own, other = wp.tid()
     depth = wp.max(deepest[own, other], deepest[other, own])
-    some_out[own, other] = wp.where(depth < none, 1.0, 0.0)
-    all_out[own, other] = wp.clamp(2.0 - depth / few, 0.0, 1.0)
+    spaced_out[own, other] = wp.where(depth < none, 1.0, 0.0)
+    others_out[own, other] = wp.clamp(2.0 - depth / few, 0.0, 1.0)
     deep_out[own, other] = NEARLY * deepest[own, other]
 
 
 @wp.kernel
-def heed_samples(
+def assign_samples(
     samples: Samples,
-    # by pairs of parts: how much of their overlaps is parted
+    # by pairs of parts: share of their overlap that is separated
     shown: wp.array2d(dtype=float),
     parts: Parts,
     # out
@@ -74,7 +75,7 @@ def heed_samples(
     lower_out: wp.array(dtype=wp.vec3),
     upper_out: wp.array(dtype=wp.vec3),
 ):
-    """Of every part the samples that its vertices may heed, and the box in which they do."""
+    """List for every part the samples that act on its vertices, and the box that contains their radii."""
     i = wp.tid()
     own = samples.own[i]
     other = samples.other[i]
@@ -84,7 +85,7 @@ def heed_samples(
     for side in range(2):
         for k in range(parts.beside.shape[1]):
             a = parts.beside[wp.where(side == 0, own, other), k]
-            # what is beside both heeds it once
+            # a part next to both gets the sample once
             if a >= 0 and (side == 0 or parts.apart[own, a] != 2):
                 at = wp.atomic_add(count_out, a, 1)
                 if at < list_out.shape[1]:
@@ -99,11 +100,11 @@ def part_surfaces(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     samples: Samples,
-    # by pairs of parts: how much of their overlaps is parted
+    # by pairs of parts: share of their overlap that is separated
     shown: wp.array2d(dtype=float),
-    # of every part
+    # by part: number and indices of the samples that act on it, and the box that contains their radii
     count: wp.array(dtype=wp.int32),
-    heeded: wp.array2d(dtype=wp.int32),
+    assigned: wp.array2d(dtype=wp.int32),
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
     # surface
@@ -114,9 +115,9 @@ def part_surfaces(
     # out
     moved_out: wp.array(dtype=wp.vec3),
 ):
-    """Displacement d of a vertex x that least violates the planes of the samples around,
+    """Displacement d of a vertex x by a regularised least squares fit to the planes of the samples around,
 
-        Σ w ((x − m + d) · n − c)² + ε d²  →  least, over samples whose plane x has passed,
+        min Σ w ((x − m + d) · n − c)² + ε d²  over samples whose plane x has passed,
 
     n towards the side the vertex is on, m a sample's point, c a clearance, w its weight times a kernel of its radius.
     """
@@ -131,18 +132,18 @@ def part_surfaces(
         facing = wp.normalize(normals[v])
         matrix = wp.mat33(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         right = wp.vec3(0.0, 0.0, 0.0)
-        for k in range(wp.min(count[own], heeded.shape[1])):
-            i = heeded[own, k]
+        for k in range(wp.min(count[own], assigned.shape[1])):
+            i = assigned[own, k]
             r = p - samples.point[i]
             near = 1.0 - wp.length_sq(r) / (samples.radius[i] * samples.radius[i])
             if near > 0.0:
                 side = float(0.0)
-                # on the side of the vertex that was found, or of the part that it was found in
+                # +1 on the side of the sample's own part, −1 on that of the part it lies inside
                 if parts.apart[own, samples.own[i]] == 2 and own != samples.other[i]:
                     side = 1.0
                 elif parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
                     side = -1.0
-                # a part next to both is on the side that it looks away from, and on none where it looks along
+                # a part next to both: the side is the one its normal points away from, undecided where tangential
                 sure = float(1.0)
                 if side == 1.0 and parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
                     away = wp.dot(facing, samples.normal[i])
@@ -150,14 +151,14 @@ def part_surfaces(
                     sure = wp.min(4.0 * wp.abs(away), 1.0)
                 n = side * samples.normal[i]
                 limit = samples.depth[i] / samples.ratio[i]
-                # what is much farther beyond the plane than that vertex was is not beside it
+                # limited to a little more than the sample's own depth
                 gap = clearance * limit * wp.sqrt(samples.counts[i])
                 missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.parted[i])
                 looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
                 if side != 0.0 and missing > 0.0 and looks > 0.0:
-                    # a plane that is just being passed counts for nothing yet: else all would jump
+                    # the weight of a plane grows from zero as it is passed, so that displacements are continuous
                     passing = wp.min(missing / (soft * limit), 1.0)
-                    # what is not parted at all holds nothing back either
+                    # pairs that are not separated have no weight either
                     share = shown[samples.own[i], samples.other[i]]
                     weight = near * near * sure * looks * passing * samples.counts[i] * wp.min(HOLDS * share, 1.0)
                     matrix += weight * wp.outer(n, n)
@@ -173,17 +174,17 @@ def move(
     # in and out
     points: wp.array(dtype=wp.vec3),
 ):
-    """Add displacements; what has none stays bit for bit."""
+    """Add displacements; vertices without one keep their exact values."""
     v = wp.tid()
     if wp.length_sq(moved[v]) > 0.0:
         points[v] = points[v] + moved[v]
 
 
 @wp.kernel
-def heed_nothing(
+def clear_assigned(
     count_out: wp.array(dtype=wp.int32), lower_out: wp.array(dtype=wp.vec3), upper_out: wp.array(dtype=wp.vec3)
 ):
-    """No samples, and boxes that hold nothing."""
+    """Reset the samples of every part to none, and their boxes to empty ones."""
     k = wp.tid()
     count_out[k] = 0
     lower_out[k] = wp.vec3(FAR, FAR, FAR)

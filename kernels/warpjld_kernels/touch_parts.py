@@ -1,22 +1,24 @@
-"""The parts of a surface that may meet: their boxes, which of them do in a frame, and the normals of those."""
+"""Broad phase of skin contact: bounding boxes of the parts, pairs that may overlap, and vertex normals of those."""
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-FAR = wp.constant(1.0e30)  # beyond every coordinate [m]: the empty box to begin with
-BESIDE = wp.constant(0.03)  # of a mesh's reach from its bones: outside its box by that nothing is inside it
+FAR = wp.constant(1.0e30)  # larger than any coordinate [m], for empty boxes
+BESIDE = wp.constant(0.03)  # margin of a mesh's box, relative to the mesh's largest distance from its bones
 
 
 @wp.struct
 class Parts:
-    """What of the parts does not depend on the pose.
+    """Pose-independent data of the parts.
 
-    ``corner`` lists the vertices of every part's mesh from ``first_corner`` on, ``border`` is 0 at corners of its
-    faces, three a face from ``first_face`` times three on, that lie on the mesh's border, else 1. ``apart`` is 1 for
-    parts that may meet, 2 for parts that are the same or neighbours; ``beside`` lists the latter, filled up with -1.
-    ``bone`` holds joints at the ends of every part's segments from ``first_bone`` on, ``around`` how far its mesh is
-    from them at most. ``facing`` is 0, or 1 where overlaps count whichever way both surfaces face.
+    ``corner`` lists the vertices of every part's mesh from ``first_corner`` on. ``border`` has three values a face from
+    3 ``first_face`` on: 0 at corners on the mesh's boundary, else 1. ``apart`` is 1 for pairs of parts that may touch,
+    2 for the same part and neighbours, else 0; ``beside`` lists the latter, padded with -1. ``bone`` holds the joints
+    at the ends of every part's segments from ``first_bone`` on, ``around`` the largest distance of its mesh from them
+    [m]. ``facing`` is 1 where overlaps count regardless of the orientation of both surfaces, else 0. By vertex:
+    ``thickness`` of the flesh [m], compliance ``give``, depth of the overlap ``at_rest`` [m], ``area`` [m²] and mean
+    ``edge`` length [m]; ``give_of`` is the mean compliance by part.
     """
 
     part: wp.array(dtype=wp.int32)
@@ -47,7 +49,7 @@ def find_boxes(
     lower_out: wp.array(dtype=wp.vec3),
     upper_out: wp.array(dtype=wp.vec3),
 ):
-    """Boxes of the parts."""
+    """Axis-aligned bounding boxes of the parts."""
     k = wp.tid()
     low = wp.vec3(FAR, FAR, FAR)
     high = -low
@@ -64,15 +66,15 @@ def find_pairs(
     parts: Parts,
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
-    # how much of the overlaps of two parts is parted; anything above nought where that is not known
+    # share of the overlap of two parts that is separated; any positive value before it is known
     shown: wp.array2d(dtype=float),
-    # out; ``wanted_out`` of parts whose mesh is asked, ``active_out`` of those that take part at all
+    # out; ``wanted_out`` marks parts whose mesh is queried, ``active_out`` those that may be displaced
     count_out: wp.array(dtype=wp.int32),
     other_out: wp.array2d(dtype=wp.int32),
     wanted_out: wp.array(dtype=wp.int32),
     active_out: wp.array(dtype=wp.int32),
 ):
-    """Parts whose boxes overlap a part's and that may meet it."""
+    """Parts that may touch a part and whose boxes overlap its own."""
     k = wp.tid()
     count = int(0)
     for other in range(parts.mesh.shape[0]):
@@ -86,14 +88,19 @@ def find_pairs(
                 count += 1
     count_out[k] = count
     for i in range(parts.beside.shape[1]):
-        # neighbours of what meets give way as well
+        # neighbours of parts that may touch are displaced as well
         if count > 0 and parts.beside[k, i] >= 0:
             active_out[parts.beside[k, i]] = 1
 
 
 @wp.func
 def smooth_skin(normal: wp.vec3, area: float) -> float:
-    """1 where a vertex has its faces side by side, 0 where they are folded: there is no inside and no outside."""
+    """1 where the faces at a vertex are nearly coplanar, 0 where they are folded, so that inside is not defined there.
+
+    Args:
+        normal: Area-weighted normal [m²].
+        area: Its length at rest [m²].
+    """
     return wp.clamp(4.0 * wp.length(normal) / wp.max(area, 1.0e-30) - 0.6, 0.0, 1.0)
 
 
@@ -111,10 +118,10 @@ def find_normals(
     unit_out: wp.array(dtype=wp.vec3),
     plain_out: wp.array(dtype=float),
 ):
-    """Vertex normals, as long as a third of the area of the faces around, and of length 1, and how plain the skin is;
-    of active parts only.
+    """Vertex normals of active parts, of the length of a third of the adjacent faces' area and of length 1, and
+    :func:`smooth_skin`.
 
-    ``around`` holds a face's two other corners, so that none is read twice.
+    ``around`` holds the two other corners of each adjacent face.
     """
     v = wp.tid()
     if active[part[v]] == 1:

@@ -1,4 +1,4 @@
-"""Where parts of a surface lie inside one another: one frame, its vertices against the meshes of other parts."""
+"""Narrow phase of skin contact: vertices of one frame that lie inside the meshes of other parts."""
 
 import warp as wp
 
@@ -7,18 +7,19 @@ from warpjld_kernels.touch_parts import BESIDE, FAR, Parts
 
 wp.set_module_options({"enable_backward": False})
 
-NEARLY = wp.constant(0.5)  # of the nearest distance beyond it: faces that near have a say in where out is
-UNSURE = wp.constant(0.0)  # length of the mean of the ways out that is none
-SURE = wp.constant(0.9)  # and that is one
+NEARLY = wp.constant(0.5)  # faces up to this share farther than the nearest contribute to the outward direction
+UNSURE = wp.constant(0.0)  # length of the mean outward direction up to which its confidence is 0
+SURE = wp.constant(0.9)  # length from which its confidence is 1
 
 
 @wp.struct
 class Samples:
     """Vertices that lie inside another part.
 
-    Of each: its number, its part and the other; a point of the surface in which both are to meet and that surface's
-    normal, towards the vertex's own part; how deep it lies, how much of that is parted, how much it counts, the radius
-    over which it does, and its depth in parts of what skin can give.
+    By sample: index of the ``vertex``, its ``own`` part and the ``other``; a ``point`` of the surface in which both
+    shall meet, and that surface's ``normal``, towards the other part's outside; penetration ``depth`` [m], the depth
+    ``parted`` that is resolved [m], the weight ``counts``, the ``radius`` over which it acts [m], and the ``ratio`` of
+    its depth to what skin can yield. ``count`` is their number.
     """
 
     count: wp.array(dtype=wp.int32)
@@ -36,7 +37,8 @@ class Samples:
 
 @wp.func
 def beside_bones(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.vec3) -> float:
-    """1 for a point as near to a part's bones as its mesh reaches, 0 a tenth farther; 1 where a part has none."""
+    """1 for a point within the largest distance of a part's mesh from its bones, falling to 0 at a tenth more; 1 where
+    a part has no bones."""
     first = parts.first_bone[k]
     last = parts.first_bone[k + 1]
     least = wp.where(first == last, 0.0, FAR)
@@ -45,7 +47,7 @@ def beside_bones(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.ve
         along = joints[parts.bone[i][1]] - a
         r = p - a
         t = wp.clamp(wp.dot(r, along) / wp.max(wp.length_sq(along), 1.0e-30), 0.0, 1.0)
-        # joints that are not known, not numbers, rule out nothing
+        # unknown joints are NaN, and do not exclude the point
         square = wp.length_sq(r - t * along)
         least = wp.where(wp.isfinite(square), wp.min(least, wp.sqrt(square)), 0.0)
     return wp.clamp(11.0 - 10.0 * least / wp.max(parts.around[k], 1.0e-30), 0.0, 1.0)
@@ -62,7 +64,8 @@ def may_be_behind(
     u: float,
     v: float,
 ) -> bool:
-    """Whether a point is behind the nearest one of a mesh, or that is next to the mesh's border and tells nothing."""
+    """Whether a point is behind the closest point of a mesh by its interpolated normal, or that point lies next to the
+    mesh's boundary, where the sign is unreliable."""
     mesh = wp.mesh_get(parts.mesh[k])
     a = mesh.indices[3 * face]
     b = mesh.indices[3 * face + 1]
@@ -77,8 +80,11 @@ def may_be_behind(
 
 @wp.struct
 class Beneath:
-    """What a point has over it of a mesh: how deep it is, the way out, how sure that is, and where it is nearest the
-    flesh's thickness, how plain the skin is and how far from a border."""
+    """Position of a point relative to the mesh of a part, averaged over near faces.
+
+    ``depth`` below the surface [m], outward ``normal``, its confidence ``sure`` (length of the mean normal), thickness
+    of the flesh ``thick`` [m], :func:`smooth_skin` in ``plain``, and ``border``, 0 at the mesh's boundary.
+    """
 
     depth: float
     normal: wp.vec3
@@ -98,10 +104,10 @@ def beneath(
     p: wp.vec3,
     least: float,
 ) -> Beneath:
-    """Means over the faces that are nearly as near as the nearest, at a distance of ``least``.
+    """Weighted means over the faces that are about as near as the nearest, whose distance is ``least`` [m].
 
-    The nearest face alone leaps where another becomes it, and with it the way out; a mean does not. In the middle of
-    the flesh the ways out point apart: their mean is short there, and says how sure the way is.
+    The closest face alone would make the outward direction discontinuous where another face becomes the closest. In the
+    middle of the flesh the directions cancel: the length of their mean is a measure of confidence.
     """
     out = Beneath()
     mesh = wp.mesh_get(parts.mesh[k])
@@ -118,7 +124,7 @@ def beneath(
         pa = points[a]
         pb = points[b]
         pc = points[c]
-        # most faces whose box reaches into the cube around are beyond the ball in it
+        # skip faces whose box lies outside the ball of radius ``reach``
         low = wp.min(wp.min(pa, pb), pc)
         high = wp.max(wp.max(pa, pb), pc)
         beyond = wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0))
@@ -155,11 +161,11 @@ def beneath(
 
 @wp.kernel
 def find_samples(
-    # vertices that are asked, and by pairs of parts how much what they say counts; at nought they are not asked
-    some: wp.array(dtype=wp.int32),
-    heard: wp.array2d(dtype=float),
-    # of every vertex one that was asked before, and by pairs of parts how deep that must lie for the vertex to be asked
-    # all the same, lest something else be taken for the deepest
+    # vertices that are tested, and weight of their samples by pairs of parts; at weight 0 they are not tested
+    vertices: wp.array(dtype=wp.int32),
+    pair_weight: wp.array2d(dtype=float),
+    # nearest probe of every vertex, tested before, and by pairs of parts the depth of a probe above which the vertex is
+    # tested even at weight 0, so that the deepest one is found
     beside: wp.array(dtype=wp.int32),
     deep_enough: wp.array2d(dtype=float),
     # frame
@@ -171,7 +177,7 @@ def find_samples(
     count: wp.array(dtype=wp.int32),
     others: wp.array2d(dtype=wp.int32),
     joints: wp.array(dtype=wp.vec3),
-    # boxes outside which vertices of every part are not asked
+    # boxes outside which vertices of every part are not tested
     within_lower: wp.array(dtype=wp.vec3),
     within_upper: wp.array(dtype=wp.vec3),
     # surface
@@ -184,33 +190,33 @@ def find_samples(
     deepest_out: wp.array2d(dtype=float),
     samples: Samples,
 ):
-    """Inside is behind the interpolated normals at the nearest points of the other part's mesh.
+    """Find vertices inside the mesh of another part: behind the interpolated normal at the closest point.
 
-    Surfaces that face the same way do not press on one another, nor does what is nearest to the border of a mesh,
-    where it is open.
+    Surfaces with the same orientation are not in contact, nor are points whose closest point lies on the boundary of a
+    mesh, where it is open.
     """
-    v = some[wp.tid()]
+    v = vertices[wp.tid()]
     p = points[v]
     own = parts.part[v]
-    asked = count[own]
+    tested = count[own]
     around = ratio_out[beside[v]]
     deep = float(0.0)
-    if asked > 0:
+    if tested > 0:
         low = within_lower[own]
         high = within_upper[own]
         if p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]:
-            asked = 0
+            tested = 0
     looks = units[v]
-    for i in range(asked):
+    for i in range(tested):
         k = others[own, i]
         low = lower[k]
         high = upper[k]
-        # what is under the open end of a mesh may be outside its box: that fades out, lest it leap
+        # points beneath the open end of a mesh may be outside its box: fade out, for continuity
         beyond = wp.length(wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0)))
         near = 1.0 - beyond / wp.max(BESIDE * parts.around[k], 1.0e-30)
-        if near > 0.0 and (heard[own, k] > 0.0 or around > deep_enough[own, k]):
+        if near > 0.0 and (pair_weight[own, k] > 0.0 or around > deep_enough[own, k]):
             near *= beside_bones(joints, parts, k, p)
-        if near > 0.0 and (heard[own, k] > 0.0 or around > deep_enough[own, k]):
+        if near > 0.0 and (pair_weight[own, k] > 0.0 or around > deep_enough[own, k]):
             reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
             found = wp.mesh_query_point_no_sign(parts.mesh[k], p, reach)
             if found.result and may_be_behind(points, units, parts, k, p, found.face, found.u, found.v):
@@ -227,7 +233,7 @@ def find_samples(
                     depth = inside * facing - parts.at_rest[v]
                     parted = wp.max(inside * facing * sure - parts.at_rest[v], 0.0)
                     limit = share * wp.min(over.thick, parts.thickness[v])
-                    # whichever way the surfaces face, and sooner where the way out is not sure
+                    # regardless of orientation, and larger where the outward direction is uncertain
                     if inside > parts.at_rest[v]:
                         ratio = (inside - parts.at_rest[v]) / limit
                         ratio += (1.0 - sure) * none * wp.min(ratio, 1.0)
@@ -244,7 +250,7 @@ def find_samples(
                             samples.normal[at] = n
                             samples.depth[at] = depth
                             samples.parted[at] = parted
-                            samples.counts[at] = heard[own, k] * wp.min(parted / (soft * limit), 1.0)
+                            samples.counts[at] = pair_weight[own, k] * wp.min(parted / (soft * limit), 1.0)
                             samples.radius[at] = wp.max(wp.min(over.thick, parts.thickness[v]), 1.2 * parts.edge[v])
                             samples.ratio[at] = depth / limit
     ratio_out[v] = deep

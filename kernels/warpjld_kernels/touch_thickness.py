@@ -1,4 +1,4 @@
-"""How wide the flesh is under every vertex of a surface."""
+"""Width of the flesh beneath every vertex of a surface, by ray casting."""
 
 import warp as wp
 
@@ -14,12 +14,12 @@ def measure_width(
     # out
     width_out: wp.array(dtype=float),
 ):
-    """Length of the ray inwards along a vertex normal to where it leaves the surface; infinite where it does not."""
+    """Distance from a vertex along its inward normal to the exit from the surface [m]; infinite where there is none."""
     v = wp.tid()
     inwards = -normals[v]
     start = points[v] + skip * inwards
     found = wp.mesh_query_ray(mesh, start, inwards, 1.0e10)
-    # what is met from outside is another piece of surface inside this one
+    # skip hits from outside, which belong to another piece of surface inside this one
     while found.result and wp.dot(found.normal, inwards) <= 0.0:
         start = start + (found.t + skip) * inwards
         found = wp.mesh_query_ray(mesh, start, inwards, 1.0e10)

@@ -1,14 +1,14 @@
-"""Which segment a surface point sees from inside the surface."""
+"""Nearest segment that is visible from a surface point inside the surface."""
 
 import warp as wp
 
 from warpjld_kernels.lanes import VECTORISED
 
-# compiled as what deforms is, so that both take the same precompiled header, which costs more than either
+# the same options as the deforming kernels, so that both use one precompiled header, which takes longest to compile
 wp.set_module_options(VECTORISED)
 
-# part of the way to a segment that must be free: one that ends on the surface, as at a wrist, is seen all the same,
-# and not as float32 happens to put it before or behind
+# share of the way to a segment that must be unobstructed, so that the visibility of a segment that ends on the surface,
+# as at a wrist, does not depend on rounding
 SHORT_OF = wp.constant(0.98)
 
 
@@ -36,11 +36,11 @@ def nearest_visible_segment(
     nearest_out: wp.array(dtype=wp.int32),
     distance_out: wp.array(dtype=float),
 ):
-    """Nearest segment whose closest point is seen without crossing the surface; the nearest of all where none is.
+    """Nearest segment whose closest point is visible without crossing the surface; the nearest of all where none is.
 
     Of segments whose distances differ by less than ``tie`` the first one counts as nearest: at a joint two are equally
-    near, and rounding, which is the processor's, must not choose. ``distances`` is a row for each point: who sees
-    nothing looks for every segment in turn.
+    near, and rounding must not decide. ``distances`` has a row of scratch for each point, since segments are tried in
+    order of distance until one is visible.
     """
     tid = wp.tid()
     point = points[tid]
@@ -51,8 +51,8 @@ def nearest_visible_segment(
     first_distance = float(0.0)
     found = int(-1)
     found_distance = float(0.0)
-    level = float(-1.0e30)  # distance of those that are equally near, and
-    last = int(starts.shape[0])  # the last of them that was refused
+    level = float(-1.0e30)  # distance of the segments that are tried now, up to ties
+    last = int(starts.shape[0])  # the last of them that was not visible
     for _ in range(2 * starts.shape[0]):
         best = int(-1)
         best_distance = float(0.0)
@@ -61,7 +61,7 @@ def nearest_visible_segment(
             if best < 0 and distance >= level and distance <= level + tie:
                 best = s
                 best_distance = distance
-        if best < 0:  # all of them refused: on to the nearest of those further away
+        if best < 0:  # none of them is visible: go on to the nearest of those further away
             further = float(1.0e30)
             for s in range(starts.shape[0]):
                 distance = distances[tid, s]

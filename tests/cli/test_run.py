@@ -84,7 +84,7 @@ def test_a_missing_script_and_a_wrong_option(tmp_path, capfd) -> None:
 
 def test_an_unknown_device_is_refused_with_those_there_are(script, tmp_path, capfd) -> None:
     assert run(script, "-o", tmp_path / "out", "--device", "cuda:99") == 1
-    assert "device 'cuda:99' is not available; there are: cpu" in capfd.readouterr().err
+    assert "device 'cuda:99' is not available; want one of: cpu" in capfd.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

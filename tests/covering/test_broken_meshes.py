@@ -148,7 +148,7 @@ def test_multigrid_that_fails_is_followed_by_another(monkeypatch: pytest.MonkeyP
 
 
 def test_what_cannot_be_solved_says_what_to_try(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpjld.covering.domains.solve", lambda *_: None)
+    monkeypatch.setattr("warpjld.covering.domains.solve_diffusion", lambda *_: None)
     with pytest.raises(InputError, match="--domains skin"):
         bind(tube_skeleton(), tube(rings=12, around=10))
 

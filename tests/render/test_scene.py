@@ -115,11 +115,11 @@ def test_sharp_edges_stay_sharp() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"vertices": np.zeros((4, 3))}, "vertices: faces want"),
+        ({"vertices": np.zeros((4, 3))}, "vertices: want at least"),
         ({"vertices": np.zeros((4, 2))}, r"vertices: want shape \(n, 3\), got \(4, 2\)"),
-        ({"joints": None}, "joints: wanted"),
+        ({"joints": None}, "joints: want positions"),
         ({"joints": np.zeros((2, 3))}, "segments: joints are 0…1, got 0…2"),
-        ({"values": np.zeros(3)}, "values: wanted with each frame where a scale"),
+        ({"values": np.zeros(3)}, "values: want them with each frame if a scale"),
     ],
 )
 def test_refuses(finger, camera: Camera, change: dict, message: str) -> None:  # type: ignore[no-untyped-def]

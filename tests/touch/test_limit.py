@@ -81,7 +81,7 @@ def test_what_is_too_deep_is_told_with_the_flexion_at_which_it_touches() -> None
     contact = SkinContact(covering, limits=False)
     poses = curled(covering.skeleton, [0.3, 1.0])
     contact.skin(covering.deform(poses), poses, first=6)
-    (line,) = [line for line in contact.told() if line.startswith("right.index:")]
+    (line,) = [line for line in contact.messages() if line.startswith("right.index:")]
     found = re.match(
         r"right\.index: ([\d.]+) mm inside right\.palm at frame 7 \(1 frame in all\), more than skin can give; "
         r"it touches at (\d+)° of flexion in all",
@@ -92,4 +92,4 @@ def test_what_is_too_deep_is_told_with_the_flexion_at_which_it_touches() -> None
     assert 180.0 < float(found[2]) < 240.0
     again = SkinContact(covering, limits=False)
     again.skin(covering.deform(poses[:1]), poses[:1])
-    assert not again.told()
+    assert not again.messages()

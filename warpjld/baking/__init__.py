@@ -1,4 +1,4 @@
-"""Baking: skin weights and corrective shapes that engines play, fitted to a covering."""
+"""Baking: skin weights and corrective shapes for game engines, fitted to a covering."""
 
 from __future__ import annotations
 

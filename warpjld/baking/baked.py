@@ -1,4 +1,4 @@
-"""A baked rig: skin weights on the rig's own joints, and corrective shapes; what engines compute of them."""
+"""A baked rig: skin weights on the rig's own joints, corrective shapes, and its deformation as engines compute it."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Baked", "bake"]
 
-_MOST_CORRECTIVES = 128  # shapes; a bound against slips
-_FRAMES = 16  # skinned at once
+_MOST_CORRECTIVES = 128  # upper bound of the number of shapes, against typing errors
+_FRAMES = 16  # frames skinned at once
 
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """Linear blend skinning with shapes added before it.
+    """Linear blend skinning of a surface to which corrective shapes are added first.
 
     Attributes:
         rig: The rig it was made for.
-        bones: The joints that skin follows.
-        joints: Bones of every welded vertex, strongest first, shape (V, influences).
+        bones: The joints that the skin follows.
+        joints: Bones of every welded vertex, by descending weight, shape (V, influences).
         weights: Their weights, rows summing to one, shape (V, influences).
-        correctives: The shapes.
+        correctives: The corrective shapes.
     """
 
     rig: Rig
@@ -45,7 +45,7 @@ class Baked:
         return f"Baked('{self.rig.name}': {self.joints.shape[1]} joints a vertex, {shapes} corrective shapes)"
 
     def blended(self, poses: Poses) -> NDArray[np.float64]:
-        """Every vertex's blended motion, shape (F, V, 3, 4)."""
+        """Every vertex's blend of the bones' transforms from rest, shape (F, V, 3, 4)."""
         moves = self.bones.moves(poses)
         out = np.zeros((len(poses), len(self.joints), 3, 4))
         for k in range(self.joints.shape[1]):
@@ -81,15 +81,15 @@ def bake(
     correctives: int = 0,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Baked:
-    """Fit skin weights and corrective shapes to what a covering does.
+    """Fit skin weights and corrective shapes to the deformation by a covering.
 
     Args:
         rig: The rig; its joints and bind pose are kept.
         covering: Its covering.
-        poses: What to fit to.
-        influences: Most joints a vertex, 4 or 8.
-        correctives: Shapes, 0 … 128.
-        progress: Called with what is done, how much of it, and how much there is.
+        poses: Poses to fit to.
+        influences: Largest number of joints per vertex, 4 or 8.
+        correctives: Number of corrective shapes, 0 … 128.
+        progress: Called with the name of the phase, its steps done, and the number of its steps.
 
     Raises:
         InputError: Influences or correctives out of range, fewer poses than shapes, or poses of another rig.
@@ -111,15 +111,15 @@ def bake(
         raise InputError(f"poses: want at least {max(correctives, 1)} to fit on, got {len(poses)}")
     covering.check(poses)
     if len(covering.skeleton) != len(rig.skeleton) or covering.surface.vertices.shape != rig.surface.vertices.shape:
-        raise InputError("covering: it is not this rig's")
+        raise InputError("covering: want one of this rig's skeleton and surface, got another rig's")
     bones = bones_of(rig)
     targets = covering.deform(poses)
     rest = rig.surface.vertices
     joints, weights = fit_weights(rest, targets, bones.moves(poses), bones.parents, influences, progress)
-    if rig.rigid is not None and (hard := rig.rigid >= 0).any():
-        joints[hard], weights[hard] = 0, 0.0
-        joints[hard, 0], weights[hard, 0] = bones.nearest[rig.rigid[hard]], 1.0
-    # as files hold them: single precision
+    if rig.rigid is not None and (is_rigid := rig.rigid >= 0).any():
+        joints[is_rigid], weights[is_rigid] = 0, 0.0
+        joints[is_rigid, 0], weights[is_rigid, 0] = bones.nearest[rig.rigid[is_rigid]], 1.0
+    # rounded to single precision, as in files
     weights = weights.astype(np.float32).astype(np.float64)
     plain = Baked(rig, bones, joints, weights, no_correctives(len(rest), len(bones)))
     if not correctives:

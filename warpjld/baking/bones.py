@@ -1,4 +1,4 @@
-"""The joints that a baked skin follows: those of the rig's own file, one for every bone of the skeleton."""
+"""Bones of a baked skin: joints of the rig's own file, one for every bone of the skeleton."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Bones:
     """B joints of a rig that its skin may follow, parents first.
 
     Attributes:
-        joints: Their numbers in the skeleton, shape (B,).
-        sources: Their numbers in the rig's file; of a generated rig, in its skeleton, shape (B,).
-        names: The file's names of them.
-        parents: The next bone above each, -1 for none, shape (B,).
-        nearest: Bone that moves with each joint of the skeleton, shape (J,).
+        joints: Their indices in the skeleton, shape (B,).
+        sources: Their indices in the rig's file; of a generated rig, in its skeleton, shape (B,).
+        names: Their names in the file.
+        parents: The nearest ancestor of each that is a bone, -1 for none, shape (B,).
+        nearest: Bone that each joint of the skeleton follows, shape (J,).
         rest: Their positions at rest [m], shape (B, 3).
     """
 
@@ -40,7 +40,7 @@ class Bones:
         return len(self.joints)
 
     def moves(self, poses: Poses) -> NDArray[np.float64]:
-        """Rigid motion of every bone from rest [m], shape (F, B, 3, 4)."""
+        """Rigid transform of every bone from rest, rotation and translation [m], shape (F, B, 3, 4)."""
         turns = poses.rotations[:, self.joints]
         out = np.empty((*turns.shape[:2], 3, 4))
         out[..., :3] = Rotation.from_quat(turns.reshape(-1, 4)).as_matrix().reshape(*turns.shape[:2], 3, 3)
@@ -48,8 +48,8 @@ class Bones:
         return out
 
     def turns(self, poses: Poses) -> NDArray[np.float64]:
-        """Rotation of every bone against its parent, from rest, in the rest pose's axes, quaternions x, y, z, w with
-        w ≥ 0, shape (F, B, 4); no rotation where there is no parent."""
+        """Rotation of every bone relative to its parent, from rest, in the rest pose's axes: quaternions x, y, z, w
+        with w ≥ 0, shape (F, B, 4); the identity where there is no parent."""
         world = poses.rotations[:, self.joints]
         out = multiply(conjugate(world[:, np.maximum(self.parents, 0)]), world)
         out[:, self.parents < 0] = (0.0, 0.0, 0.0, 1.0)
@@ -57,7 +57,7 @@ class Bones:
 
 
 def bones_of(rig: Rig) -> Bones:
-    """The bones of a rig: joints of its file that carry something.
+    """The bones of a rig: joints of its file that have children in the skeleton.
 
     Raises:
         InputError: None of its joints is a bone.
@@ -82,6 +82,7 @@ def bones_of(rig: Rig) -> Bones:
 
 
 def _above(parents: NDArray[np.int32], joint: int) -> list[int]:
+    """Ancestors of a joint, nearest first."""
     out = []
     while (joint := int(parents[joint])) >= 0:
         out.append(joint)

@@ -1,10 +1,11 @@
-"""Corrective shapes: what skin weights leave over, as a few shapes that joint rotations drive.
+"""Corrective shapes: the residual of blend skinning as a few shapes that joint rotations drive.
 
-The error of blend skinning at frame f is brought back to the bind pose by each vertex's blended matrix, since engines
-add shapes before they skin. Every bone's rotation against its parent, a quaternion x, y, z, w with w ≥ 0, gives nine
-features: x, y, z, x², y², z², xy, xz, yz. A ridge regression predicts the errors from them; its strength is the one
-with the least leave-one-out error. Of the prediction, the K directions of largest variance are the shapes (reduced-rank
-regression: Izenman 1975), so that shapes are what joints predict, not what one pose happens to need.
+The error of blend skinning at frame f is mapped back to the bind pose by the inverse of each vertex's blended matrix,
+since engines add shapes before they skin. Every bone's rotation relative to its parent, a quaternion x, y, z, w with
+w ≥ 0, gives nine features: x, y, z, x², y², z², xy, xz, yz. A ridge regression predicts the errors from them; its
+strength is the one with the least leave-one-out error. The K directions of largest variance of the prediction are the
+shapes (reduced-rank regression: Izenman 1975), so that they contain what joint rotations predict, not the errors of
+single poses.
 """
 
 from __future__ import annotations
@@ -16,21 +17,21 @@ from numpy.typing import NDArray
 
 __all__ = ["Correctives", "features", "fit_correctives", "no_correctives"]
 
-_RIDGES = 10.0 ** np.arange(-6.0, 1.1, 0.5)  # of the features' mean square
-_DAMPING = 1e-2  # of blended matrices that are nearly singular: candy wrappers take no shape
-_HEARD = 0.01  # of the joint that drives most
+_RIDGES = 10.0 ** np.arange(-6.0, 1.1, 0.5)  # strengths tried, relative to the features' mean square
+_DAMPING = 1e-2  # damping of inverses of nearly singular blended matrices (candy-wrapper artefacts)
+_SMALLEST_DRIVE = 0.01  # share of the strongest joint's contribution below which a joint's features are left out
 _PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True, eq=False)
 class Correctives:
-    """K shapes and what drives them.
+    """K shapes and the linear functions of joint rotations that drive them.
 
     Attributes:
         shapes: Displacements in the bind pose [m], shape (K, V, 3).
-        drivers: Weight of every feature of every bone, shape (K, B, 9).
-        ridge: Strength of the regression chosen.
-        span: Smallest and largest weight that the poses fitted to ask for, shape (K, 2).
+        drivers: Coefficient of every feature of every bone in a shape's weight, shape (K, B, 9).
+        ridge: Strength of the ridge regression chosen.
+        span: Smallest and largest weight over the poses fitted to, zero included, shape (K, 2).
     """
 
     shapes: NDArray[np.float64]
@@ -42,17 +43,17 @@ class Correctives:
         return len(self.shapes)
 
     def weights(self, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weights of the shapes, shape (F, K), from rotations of bones against their parents (F, B, 4)."""
+        """Weights of the shapes, shape (F, K), from rotations of bones relative to their parents (F, B, 4)."""
         return np.einsum("fbn,kbn->fk", features(turns), self.drivers, optimize=True)
 
 
 def no_correctives(vertices: int, bones: int) -> Correctives:
-    """None at all."""
+    """An empty set of shapes."""
     return Correctives(np.zeros((0, vertices, 3)), np.zeros((0, bones, 9)))
 
 
 def features(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """x, y, z, x², y², z², xy, xz, yz of quaternions (F, B, 4), shape (F, B, 9)."""
+    """Features x, y, z, x², y², z², xy, xz, yz of quaternions (F, B, 4), shape (F, B, 9)."""
     vector = turns[..., :3]
     return np.concatenate([vector, np.stack([vector[..., a] * vector[..., b] for a, b in _PRODUCTS], -1)], -1)
 
@@ -60,13 +61,13 @@ def features(turns: NDArray[np.float64]) -> NDArray[np.float64]:
 def fit_correctives(
     errors: NDArray[np.float64], blended: NDArray[np.float64], turns: NDArray[np.float64], count: int
 ) -> Correctives:
-    """K = ``count`` shapes for what is left over at F frames.
+    """Fit K = ``count`` shapes to the residual of blend skinning in F frames.
 
     Args:
-        errors: Target less skinned position [m], shape (F, V, 3).
-        blended: Linear part of every vertex's blended motion, shape (F, V, 3, 3).
-        turns: Rotations of the bones against their parents, shape (F, B, 4).
-        count: At most as many as frames.
+        errors: Target minus skinned position [m], shape (F, V, 3).
+        blended: Linear part of every vertex's blended transform, shape (F, V, 3, 3).
+        turns: Rotations of the bones relative to their parents, shape (F, B, 4).
+        count: Number of shapes, at most F.
     """
     vertices = errors.shape[1]
     normal = np.einsum("fvji,fvjk->fvik", blended, blended) + _DAMPING * np.eye(3)
@@ -76,10 +77,10 @@ def fit_correctives(
     between = rows @ rows.T
     inputs = features(turns)
     first = _reduced(rows, between, inputs, count)
-    # joints whose shapes are not among the K must not be heard in others': the regression again, without them
-    heard = np.einsum("fbn,kbn->fbk", inputs, first.drivers) * np.linalg.norm(first.shapes, axis=1)
-    share = (heard**2).sum(axis=(0, 2))
-    inputs[:, share < _HEARD * share.max()] = 0.0
+    # joints that hardly drive the K shapes must not disturb them: repeat the regression without their features
+    contribution = np.einsum("fbn,kbn->fbk", inputs, first.drivers) * np.linalg.norm(first.shapes, axis=1)
+    share = (contribution**2).sum(axis=(0, 2))
+    inputs[:, share < _SMALLEST_DRIVE * share.max()] = 0.0
     found = _reduced(rows, between, inputs, count)
     return Correctives(found.shapes.reshape(-1, vertices, 3), found.drivers, found.ridge, found.span)
 
@@ -87,7 +88,17 @@ def fit_correctives(
 def _reduced(
     rows: NDArray[np.float64], between: NDArray[np.float64], by_bone: NDArray[np.float64], count: int
 ) -> Correctives:
-    """Reduced-rank regression of errors (F, 3 V), whose products are ``between``; shapes are flat, (K, 3 V)."""
+    """Reduced-rank ridge regression.
+
+    Args:
+        rows: Errors, shape (F, 3 V).
+        between: Their Gram matrix, shape (F, F).
+        by_bone: Features, shape (F, B, 9).
+        count: Largest rank K.
+
+    Returns:
+        Shapes, flattened to (K, 3 V), and their drivers.
+    """
     frames = len(rows)
     inputs = by_bone.reshape(frames, -1)
     left, values, right_vectors = np.linalg.svd(inputs, full_matrices=False)
@@ -101,15 +112,22 @@ def _reduced(
     length = np.sqrt(spread[kept])
     shapes = ((hat @ directions[:, kept]) / length).T @ rows
     drivers = ((right_vectors.T * shrink) @ (left.T @ (rows @ shapes.T))).T
-    asked = inputs @ drivers.T
-    span = np.column_stack([np.minimum(asked.min(axis=0), 0.0), np.maximum(asked.max(axis=0), 0.0)])
+    weights = inputs @ drivers.T
+    span = np.column_stack([np.minimum(weights.min(axis=0), 0.0), np.maximum(weights.max(axis=0), 0.0)])
     return Correctives(shapes, drivers.reshape(len(kept), *by_bone.shape[1:]), float(ridge), span)
 
 
 def _left_out(
     left: NDArray[np.float64], values: NDArray[np.float64], ridge: float, between: NDArray[np.float64]
 ) -> float:
-    """Sum of squared errors where every frame is predicted from the others."""
+    """Leave-one-out error: sum of squares where every frame is predicted from the others.
+
+    Args:
+        left: Left singular vectors of the features.
+        values: Their singular values.
+        ridge: Strength of the regression.
+        between: Gram matrix of the errors, shape (F, F).
+    """
     hat = (left * (values**2 / (values**2 + ridge))) @ left.T
     away = (np.eye(len(hat)) - hat) / np.maximum(1.0 - np.diag(hat), 1e-6)[:, None]
     return float(np.einsum("ij,jk,ik->", away, between, away, optimize=True))

@@ -1,4 +1,4 @@
-"""Poses to fit a baked skin on, over the whole range of motion, and others to judge it by that are never fitted."""
+"""Training poses for a baked skin, over the whole range of motion, and test poses that are never fitted."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from warpjld.skeleton.tree import CHANNELS, Skeleton
 __all__ = ["NamedPoses", "poses_in_a_row", "training_poses", "unseen_poses"]
 
 _FLEXION, _PIVOT, _TWISTING, _ABDUCTION = range(len(CHANNELS))
-_WIDE = np.radians(150.0)  # no joint is trained further, whatever its limits allow
-_UNKNOWN = np.radians(30.0)  # of channels about whose joint nothing is known: limits as wide one way as the other
-_TURN = np.radians(20.0)  # of joints turned alone about the axes of the world: motion files heed no limits
-_SHARES = (0.5, 1.0)  # of a limit, of joints moved alone
-_ASIDE = 0.6  # of a limit, of all channels but flexion in random poses: they seldom reach it together
-_RANDOM = 200  # random poses beside the systematic ones
+_WIDE = np.radians(150.0)  # largest angle in training, whatever the limits allow
+_UNKNOWN = np.radians(30.0)  # largest angle of channels with wide, symmetric limits, of which nothing is known
+_TURN = np.radians(20.0)  # rotation of single joints about the world's axes, since motion files do not respect limits
+_SHARES = (0.5, 1.0)  # shares of the limits in poses of single joints
+_ASIDE = 0.6  # share of the limits of all channels but flexion in random poses: they seldom reach them together
+_RANDOM = 200  # number of random poses
 
 
 @dataclass(frozen=True, eq=False)
 class NamedPoses:
-    """Poses with what each of them is.
+    """Poses with a name each.
 
     Attributes:
-        names: One a frame; those of the same name are judged together.
-        poses: As many frames.
+        names: Name of each frame; accuracy is reported by name.
+        poses: The poses, as many frames.
     """
 
     names: tuple[str, ...]
@@ -39,25 +39,25 @@ class NamedPoses:
 
 
 def poses_in_a_row(parts: list[Poses]) -> Poses:
-    """All frames in a row."""
+    """Concatenation of poses."""
     return Poses(*(np.concatenate([getattr(p, n) for p in parts]) for n in ("positions", "rotations", "flexion")))
 
 
 def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) -> Poses:
     """Every joint alone through its range, every bone turned a little about each axis, and random poses.
 
-    In random poses the joints of a chain bend together as they do in life: each by a share of its range, half of
-    which is common to the whole pose.
+    In random poses joints bend together, as in natural motion: each by a share of its range, half of which is common
+    to the whole pose.
 
     Args:
         skeleton: The rest skeleton.
-        seed: Of the random poses.
-        random: How many of them.
+        seed: Seed of the random poses.
+        random: Number of random poses.
     """
     low, high = ranges(skeleton)
     inner = _inner(skeleton)
     alone: list[NDArray[np.float64]] = []
-    unknown: NDArray[np.bool_] = np.asarray(_unknown(skeleton).all(axis=1))  # of these, turning them says it all
+    unknown: NDArray[np.bool_] = np.asarray(_unknown(skeleton).all(axis=1))  # these are covered by ``_turned``
     for j, channel in ((j, channel) for j in inner if not unknown[j] for channel in range(len(CHANNELS))):
         for end in (float(low[j, channel]), float(high[j, channel])):
             for share in _SHARES if abs(end) > 1e-6 else ():
@@ -68,7 +68,7 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
     many = np.zeros((random, *low.shape))
     common = generator.uniform(0.0, 1.0, (random, 1, 1))
     own: NDArray[np.float64] = np.asarray(generator.uniform(0.0, 1.0, many.shape))
-    # half of the poses bend only some joints, so that a joint's share is not taken for its neighbours'
+    # half of the poses bend only some joints, so that the effects of neighbouring joints can be told apart
     moves = generator.uniform(0.0, 1.0, many.shape) < np.where(np.arange(random)[:, None, None] % 2, 0.4, 1.0)
     bent: NDArray[np.float64] = 0.5 * (common + own)
     side = generator.uniform(-1.0, 1.0, many.shape)
@@ -86,7 +86,7 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
 
 
 def unseen_poses(skeleton: Skeleton) -> NamedPoses:
-    """Named poses of hands and bodies that are never fitted on; where a skeleton has no such joints, random ones."""
+    """Named test poses of hands and bodies, and random ones; those of joints that a skeleton lacks are left out."""
     names: list[str] = []
     parts: list[Poses] = []
 
@@ -138,7 +138,8 @@ def unseen_poses(skeleton: Skeleton) -> NamedPoses:
 
 
 def ranges(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest angle [rad] that joints are trained to, shapes (J, 4); zero for ends and roots."""
+    """Smallest and largest angle [rad] of every joint's channels in training, shape (J, 4) each; zero for extremities
+    and roots."""
     wide: NDArray[np.float64] = np.asarray(np.where(_unknown(skeleton), _UNKNOWN, _WIDE))
     still = np.setdiff1d(np.arange(len(skeleton)), [j for j in _inner(skeleton) if skeleton.parents[j] >= 0])
     low: NDArray[np.float64] = np.clip(skeleton.limits[..., 0], -wide, 0.0)
@@ -148,13 +149,13 @@ def ranges(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def _unknown(skeleton: Skeleton) -> NDArray[np.bool_]:
-    """Channels that may go as far one way as the other, and far: nothing is known of them, shape (J, 4)."""
+    """Channels with wide, symmetric limits, whose true range is not known, shape (J, 4)."""
     low, high = skeleton.limits[..., 0], skeleton.limits[..., 1]
     return np.asarray((high >= np.radians(89.0)) & (np.abs(low + high) < 1e-9))
 
 
 def _turned(skeleton: Skeleton, inner: list[int]) -> Poses:
-    """Every bone turned alone about each axis of the world, both ways."""
+    """Poses with one bone turned about one of the world's axes, in either direction."""
     turns = [(j, sign * _TURN * np.eye(3)[axis]) for j in inner for axis in range(3) for sign in (1.0, -1.0)]
     local = np.zeros((len(turns) or 1, len(skeleton), 4))
     local[..., 3] = 1.0
@@ -164,10 +165,11 @@ def _turned(skeleton: Skeleton, inner: list[int]) -> Poses:
 
 
 def _inner(skeleton: Skeleton) -> list[int]:
-    """Joints that carry a bone."""
+    """Joints with children, at which a bone begins."""
     return [j for j, children in enumerate(skeleton.children) if children]
 
 
 def _joints(skeleton: Skeleton, wanted: Callable[[list[str]], bool]) -> list[int]:
+    """Joints of digits whose name, split at its dots, satisfies a condition."""
     split = ((j, name.split(".")) for j, name in enumerate(skeleton.names))
     return [j for j, words in split if len(words) > 1 and words[-2] in DIGITS and wanted(words)]

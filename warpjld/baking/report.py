@@ -1,4 +1,4 @@
-"""How far a baked rig is from what it stands for, on poses that it was not fitted on, beside painted weights."""
+"""Accuracy of a baked rig against its covering on test poses, compared with painted weights; as CSV or JSON."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ __all__ = ["REPORTS", "Accuracy", "accuracy", "check_report", "write_report"]
 REPORTS = (".csv", ".json")
 """Suffixes of reports."""
 
-_MM = 1000.0  # millimetres a metre
-_FRAMES = 16  # measured at once: bounds memory, no result depends on it
+_MM = 1000.0  # millimetres per metre
+_FRAMES = 16  # frames measured at once, which bounds memory
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Distances [mm] from the covering over all vertices and poses of one name; None where there is nothing to judge.
+    """Distances [mm] from the covering over all vertices and poses of one name; None where a method does not apply.
 
     Attributes:
         poses: Name of the poses, ``all`` for all together.
-        frames: How many.
-        painted_rms: Of the rig's painted weights, root of the mean square, and
-        painted_largest: the largest.
-        weights_rms: Of the fitted weights alone, and
-        weights_largest: the largest.
-        corrected_rms: Of weights and corrective shapes, and
-        corrected_largest: the largest.
+        frames: Number of poses.
+        painted_rms: RMS distance with the rig's painted weights.
+        painted_largest: Largest distance with them.
+        weights_rms: RMS distance with the fitted weights alone.
+        weights_largest: Largest distance with them.
+        corrected_rms: RMS distance with fitted weights and corrective shapes.
+        corrected_largest: Largest distance with them.
     """
 
     poses: str
@@ -52,7 +52,13 @@ class Accuracy:
 
 
 def accuracy(baked: Baked, covering: Covering, unseen: NamedPoses) -> list[Accuracy]:
-    """One row for all poses, then one for each name."""
+    """Accuracy over all poses, then over those of each name.
+
+    Args:
+        baked: The baked rig.
+        covering: The covering it was fitted to.
+        unseen: Test poses.
+    """
     rig, poses = baked.rig, unseen.poses
     found: dict[str, list[NDArray[np.float64]]] = {"weights": []}
     if rig.skin is not None:
@@ -63,26 +69,30 @@ def accuracy(baked: Baked, covering: Covering, unseen: NamedPoses) -> list[Accur
         part = poses[start : start + _FRAMES]
         wanted = covering.deform(part).astype(np.float64)
 
-        def apart(got: NDArray[np.float64], wanted: NDArray[np.float64] = wanted) -> NDArray[np.float64]:
-            """Squared distances by frame: their mean and the largest, shape (f, 2)."""
+        def squared_distances(got: NDArray[np.float64], wanted: NDArray[np.float64] = wanted) -> NDArray[np.float64]:
+            """Mean and largest squared distance of every frame [m²], shape (f, 2)."""
             square = ((got - wanted) ** 2).sum(axis=-1)
             return np.column_stack([square.mean(axis=1), square.max(axis=1)])
 
-        found["weights"].append(apart(baked.deform(part, corrected=False)))
+        found["weights"].append(squared_distances(baked.deform(part, corrected=False)))
         if "corrected" in found:
-            found["corrected"].append(apart(baked.deform(part)))
+            found["corrected"].append(squared_distances(baked.deform(part)))
         if rig.skin is not None:
-            found["painted"].append(apart(linear_blend_skinning(rig.skeleton, rig.surface.vertices, rig.skin, part)))
+            painted = linear_blend_skinning(rig.skeleton, rig.surface.vertices, rig.skin, part)
+            found["painted"].append(squared_distances(painted))
     squares = {kind: np.concatenate(rows) for kind, rows in found.items()}
     names = np.array(unseen.names)
     return [_row(name, names == name if n else np.ones(len(names), bool), squares) for n, name in _named(unseen)]
 
 
 def _named(unseen: NamedPoses) -> list[tuple[int, str]]:
+    """Numbered names of the rows, ``all`` first."""
     return list(enumerate(["all", *dict.fromkeys(unseen.names)]))
 
 
 def _row(name: str, frames: NDArray[np.bool_], squares: dict[str, NDArray[np.float64]]) -> Accuracy:
+    """Accuracy over the frames of a mask, from mean and largest squared distances (F, 2) of each method."""
+
     def of(kind: str) -> tuple[float, float] | tuple[None, None]:
         if kind not in squares:
             return None, None
@@ -97,7 +107,7 @@ def _row(name: str, frames: NDArray[np.bool_], squares: dict[str, NDArray[np.flo
 
 
 def check_report(path: Path) -> None:
-    """Raise InputError for a suffix that no report has."""
+    """Raise InputError for a suffix that is not among ``REPORTS``."""
     if path.suffix.lower() not in REPORTS:
         raise InputError(f"unknown kind of report '{path.suffix}'; known: {', '.join(REPORTS)}", path=path)
 
@@ -106,7 +116,7 @@ def write_report(path: Path, rows: list[Accuracy]) -> None:
     """Write rows as CSV or JSON, by the suffix; millimetres.
 
     Raises:
-        InputError: Another suffix, or a place that cannot be written.
+        InputError: Another suffix, or a file that cannot be written.
     """
     check_report(path)
     records = [{k: round(v, 6) if isinstance(v, float) else v for k, v in asdict(row).items()} for row in rows]

@@ -1,4 +1,4 @@
-"""Skin weights that bring blend skinning as near to given deformations as it comes, bones and bind pose fixed.
+"""Least squares fit of skin weights to given deformations, with fixed bones and bind pose.
 
 For one vertex v with targets y_f, the error of weights w ≥ 0, Σ w = 1, is wᵀ G w with G = Σ_f D_fᵀ D_f and columns
 D_fb = M_fb v − y_f. Its minimum over the simplex is u / Σ u, where u ≥ 0 minimises ½ uᵀ G u − Σ u: a non-negative least
@@ -16,10 +16,10 @@ from scipy.optimize import nnls
 
 __all__ = ["fit_weights"]
 
-_CANDIDATES = 10  # bones tried a vertex
-_NEAR = 2  # steps in the tree from the best bone to its candidates
-_RIDGE = 1e-9  # of G's trace: two bones that moved alike share
-_NUMBERS = 8_000_000  # held at once
+_CANDIDATES = 10  # bones tried per vertex
+_NEAR = 2  # steps in the tree from the best bone within which candidates are preferred
+_RIDGE = 1e-9  # regularisation relative to G's trace: two bones that move alike share the weight
+_NUMBERS = 8_000_000  # numbers stored at once, which bounds memory
 
 
 def fit_weights(
@@ -30,15 +30,15 @@ def fit_weights(
     influences: int,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Bones and weights, strongest first, rows summing to one, shapes (V, influences).
+    """Fit bones and weights of every vertex, by descending weight, rows summing to one, shape (V, influences) each.
 
     Args:
         rest: Vertices at rest [m], shape (V, 3).
-        targets: What they deform to [m], shape (F, V, 3).
-        moves: Motion of B bones from rest, shape (F, B, 3, 4).
-        parents: The bone above each, -1 for none, shape (B,).
-        influences: Most bones a vertex.
-        progress: Called with what is done, vertices done, and V.
+        targets: Their target positions [m], shape (F, V, 3).
+        moves: Rigid transforms of B bones from rest, shape (F, B, 3, 4).
+        parents: Parent of each bone, -1 for none, shape (B,).
+        influences: Largest number of bones per vertex.
+        progress: Called with the name of the phase, vertices done, and V.
     """
     vertices, bones = len(rest), moves.shape[1]
     near = _tree_distance(parents)
@@ -50,12 +50,12 @@ def fit_weights(
     for start in range(0, vertices, length):
         block = slice(start, min(start + length, vertices))
         homogeneous = np.column_stack([rest[block], np.ones(block.stop - start)])
-        # (v, B, 3 F): where each bone alone would be off
+        # (v, B, 3 F): error of following each bone alone
         off = (homogeneous @ table).reshape(len(homogeneous), bones, -1)
         off -= targets[:, block].transpose(1, 0, 2).reshape(len(homogeneous), 1, -1)
         alone = np.einsum("vbn,vbn->vb", off, off)
         best = alone.argmin(axis=1)
-        # near in the skeleton first, then by how well they do alone
+        # bones near the best one in the skeleton first, then by their error alone
         rank = alone / (alone.max(axis=1, keepdims=True) + 1e-300) + 10.0 * (near[best] > _NEAR)
         chosen = np.argsort(rank, axis=1, kind="stable")[:, :width]
         columns = np.take_along_axis(off, chosen[:, :, None], axis=1)
@@ -71,7 +71,15 @@ def fit_weights(
 
 
 def _on_simplex(gram: NDArray[np.float64], most: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The best weights of at most so many columns: the least is dropped until they are few enough."""
+    """Best convex weights with at most ``most`` non-zero ones: columns are dropped greedily.
+
+    Args:
+        gram: G, shape (n, n).
+        most: Largest number of columns kept.
+
+    Returns:
+        Columns kept, and their weights.
+    """
     kept = np.arange(len(gram))
     while True:
         share = _convex(gram[np.ix_(kept, kept)])
@@ -84,7 +92,7 @@ def _on_simplex(gram: NDArray[np.float64], most: int) -> tuple[NDArray[np.int64]
 
 
 def _cheapest(gram: NDArray[np.float64], share: NDArray[np.float64]) -> int:
-    """Column whose loss costs least, its share going to the others as they stand."""
+    """Column whose removal increases the error least, with the other weights rescaled."""
     rest = 1.0 - share
     slope = gram @ share
     error = share @ slope
@@ -93,7 +101,7 @@ def _cheapest(gram: NDArray[np.float64], share: NDArray[np.float64]) -> int:
 
 
 def _convex(gram: NDArray[np.float64]) -> NDArray[np.float64]:
-    """w ≥ 0, Σ w = 1 with the least wᵀ G w."""
+    """Minimiser w of wᵀ G w under w ≥ 0, Σ w = 1."""
     trace = float(np.trace(gram))
     if trace <= 0.0:  # nothing moves
         return np.eye(len(gram))[0]
@@ -105,7 +113,7 @@ def _convex(gram: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _tree_distance(parents: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Steps between bones in the tree, shape (B, B); B where there is no way."""
+    """Number of steps between bones in the tree, shape (B, B); B where they are not connected."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import shortest_path
 

@@ -1,4 +1,4 @@
-"""A baked rig in the files that engines read: a skin, morph targets, and a JSON that says what drives them."""
+"""Files of a baked rig for game engines: skin and morph targets in glTF or USD, and their drivers in JSON."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ __all__ = ["BAKED", "check_baked", "drivers_file", "write_baked"]
 BAKED = (".glb", ".usd", ".usda", ".usdc")
 """Suffixes of baked rigs."""
 
-_MARGIN = 0.1  # of the range of a shape's weight, left at both ends for poses that go further than those fitted
+_MARGIN = 0.1  # margin of a shape's range of weights at both ends, for poses beyond those fitted
 
 
 def drivers_file(path: Path) -> Path:
-    """Where the correctives' drivers lie: ``hand.glb`` has ``hand.correctives.json`` beside it."""
+    """Path of the correctives' drivers: ``hand.correctives.json`` beside ``hand.glb``."""
     return path.with_name(f"{path.stem}.correctives.json")
 
 
 def check_baked(path: Path) -> None:
-    """Raise what ``write_baked`` would for a file's name.
+    """Check the name of a file before ``write_baked``.
 
     Raises:
         InputError: Unknown suffix.
@@ -47,16 +47,17 @@ def check_baked(path: Path) -> None:
 def write_baked(path: Path, baked: Baked, clip: Poses | None = None, *, rate: float = 30.0) -> WrittenMotion:
     """Write a baked rig; with a clip also its joints and the shapes' weights over time.
 
-    What drives the shapes goes to a JSON file beside it (``drivers_file``): see docs/reference/baked-files.md.
+    The drivers of the shapes are written to a JSON file beside it (``drivers_file``): see
+    docs/reference/baked-files.md.
 
     Args:
         path: The file, ``.glb`` or ``.usd``, ``.usda``, ``.usdc``.
         baked: The rig.
-        clip: Poses to animate it by; at rest without.
-        rate: Frames a second of the clip.
+        clip: Poses of its animation; without, the rig is at rest.
+        rate: Frames per second of the clip.
 
     Raises:
-        InputError: Unknown suffix, poses of another rig, or a place that cannot be written.
+        InputError: Unknown suffix, poses of another rig, or a file that cannot be written.
         MissingExtraError: The format needs an optional dependency.
 
     Examples:
@@ -109,16 +110,17 @@ def write_baked(path: Path, baked: Baked, clip: Poses | None = None, *, rate: fl
 
 @dataclass(frozen=True, eq=False)
 class _Targets:
-    """Shapes as files have them, with weights from 0 to 1: programs clamp others (Blender 5.0 does on import).
+    """Morph targets for files, with weights from 0 to 1: programs clamp others (Blender 5.0 does on import).
 
     A shape whose weight goes from a < 0 to b is stored (b − a) times as large and its weight w as (w − a) / (b − a).
-    A last target, of weight 1, takes the shapes off that are there at rest. All weights 0 give the bind pose too.
+    A last target, of constant weight 1, subtracts the shapes at rest. With all weights 0 the surface is the bind pose
+    too.
 
     Attributes:
         names: Their names.
         shapes: Displacements [m], shape (K + 1, V, 3).
         offset: Weight at rest, shape (K + 1,).
-        scale: What a driven weight is multiplied by before that is added, shape (K,).
+        scale: Factor of a driven weight, before ``offset`` is added, shape (K,).
     """
 
     names: tuple[str, ...]
@@ -128,7 +130,7 @@ class _Targets:
 
 
 def _targets(baked: Baked, shown: NDArray[np.float64]) -> _Targets:
-    """The targets of a file; ``shown`` are weights (F, K) of its clip, which may go further than what was fitted."""
+    """The targets of a file; ``shown`` are weights (F, K) of its clip, which may exceed the range fitted to."""
     found = baked.correctives
     count = len(found)
     if not count:
@@ -142,6 +144,7 @@ def _targets(baked: Baked, shown: NDArray[np.float64]) -> _Targets:
 
 
 def _drivers(baked: Baked, targets: _Targets) -> dict[str, Any]:
+    """Content of the drivers' file: features, and the coefficients of every shape by joint."""
     bones, found = baked.bones, baked.correctives
     shapes: list[dict[str, Any]] = []
     for k, name in enumerate(targets.names):

@@ -154,7 +154,7 @@ def deform_clip(
         ),
         warnings=(
             *moved.warnings,
-            *(() if contact is None else contact.told()),
+            *(() if contact is None else contact.messages()),
             *(warning for one in told for warning in one.warnings),
         ),
     )

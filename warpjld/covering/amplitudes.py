@@ -1,10 +1,11 @@
-"""The deformation as a linear function of the amplitudes of roundings and muscles.
+"""Derivatives of the deformed surface by the inflation and muscle amplitudes, in which it is linear.
 
-Coefficient fields, places and rotations do not depend on the amplitudes a, so the covering formula (``fields.py``) is
+Coefficient fields, projections and rotations do not depend on the amplitudes a, so the covering formula
+(``fields.py``) is
 
     S'(a) = S'(a₀) + Σ_p (a_p − a₀_p) D_p,   D_p = FR g_p rot(q, d) of a rounding, f m_p rot(q, h) of a muscle
 
-with one sparse direction D_p for each of them: fitting amplitudes takes no diffusion, no packing and no kernel.
+with one sparse direction D_p for each amplitude: fitting them needs no diffusion, no packing and no kernel.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Frame", "LinearDeformation", "amplitudes_of", "with_amplitudes"]
 
-_STILL = 1e-6  # flexion ratio below which a joint does not bend: rounding leaves as much
+_STILL = 1e-6  # flexion ratio below which a joint counts as straight: floating-point error reaches this size
 
 
 def amplitudes_of(parameters: Parameters) -> NDArray[np.float64]:
-    """Inflation of J joints, then muscle of those where segments begin, shape (2 J,)."""
+    """Inflation amplitudes of J joints, then muscle amplitudes by the joint where the segment begins, shape (2 J,)."""
     return np.concatenate([parameters.inflation, parameters.muscle])
 
 
@@ -42,14 +43,14 @@ def with_amplitudes(parameters: Parameters, amplitudes: NDArray[np.float64]) -> 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One pose.
+    """The deformed surface in one pose, and its derivatives by the amplitudes.
 
     Attributes:
-        number: Of the pose.
+        number: Index of the pose.
         points: S'(a₀) [m], shape (V, 3).
-        moved: Vertices that amplitudes move in it, shape (n,).
-        directions: D of those [m], shape (3 n, 2 J); rows are x, y, z of a vertex.
-        ratio: How far the flexion ratios of the joints are from those at rest, shape (J,).
+        moved: Vertices that depend on the amplitudes in this pose, shape (n,).
+        directions: Derivatives D of their positions [m], shape (3 n, 2 J); rows are x, y, z of each vertex.
+        ratio: Absolute difference of the joints' flexion ratios from those at rest, shape (J,).
     """
 
     number: int
@@ -60,14 +61,14 @@ class Frame:
 
 
 class LinearDeformation:
-    """A covering over F poses as a function of its 2 J amplitudes; all else is as its parameters have it.
+    """A covering over F poses as a function of its 2 J amplitudes; all its other parameters stay fixed.
 
     Args:
         covering: A bound surface.
         poses: F poses of its skeleton.
 
     Raises:
-        InputError: Poses that do not fit or are not finite.
+        InputError: Poses of another skeleton, or not finite.
     """
 
     def __init__(self, covering: Covering, poses: Poses) -> None:
@@ -78,7 +79,8 @@ class LinearDeformation:
         self._drivers = drive(skeleton, anchors, poses)
         joints, initial = len(skeleton), initial_ratio(skeleton)
         scalars = scalar_inputs(anchors, covering.parameters, self._drivers)
-        # offsets are those of straight joints: to first order, the rest pose's inflation is taken off every pose's
+        # the offsets in use are those of straight joints (``rows_of``): to first order, the inflation at rest is
+        # subtracted from that of every pose
         scalars[:, :joints] -= initial
         scalars[:, joints + fields.palm.shape[1] :] -= 0.5 * initial[anchors.ends].sum(axis=1)
         self._ratio, self._driven = scalars[:, :joints].copy(), scalars[:, joints + fields.palm.shape[1] :].copy()
@@ -94,12 +96,13 @@ class LinearDeformation:
         return len(self._ratio)
 
     def frames(self, block: int = 16) -> Iterator[Frame]:
-        """All poses, one after another."""
+        """All poses in order, deformed ``block`` at a time."""
         for start, points in self.covering.blocks(self.poses, frames=block):
             for k, surface in enumerate(points):
                 yield self._frame(start + k, surface.copy())
 
     def _frame(self, number: int, points: NDArray[np.float32]) -> Frame:
+        """The pose of an index with its surface (V, 3), and the derivatives D of the vertices that amplitudes move."""
         fields, drivers, joints = self.covering.fields, self._drivers, len(self.covering.skeleton)
         round_row, round_column, round_value, _ = _scaled(self._roundings, self._ratio[number])
         muscle_row, segment, muscle_value, entry = _scaled(self._muscles, self._driven[number])
@@ -123,7 +126,12 @@ class LinearDeformation:
 def _scaled(
     fields: sp.csc_array, by: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """Row, column, value times ``by`` of its column, and place of all entries in columns where that is not 0."""
+    """Entries of the columns whose factor is not zero: row, column, value × factor, and index into ``fields.data``.
+
+    Args:
+        fields: Coefficients, shape (V, columns).
+        by: Factor of every column, shape (columns,).
+    """
     columns = np.flatnonzero(by)
     length = np.diff(fields.indptr)[columns]
     before = np.cumsum(length) - length

@@ -1,4 +1,4 @@
-"""Skinning by painted weights, to compare with: linear blend and dual quaternions. NumPy, float64."""
+"""Reference skinning methods with painted weights: linear blend and dual quaternions. NumPy, float64."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["dual_quaternion_skinning", "linear_blend_skinning"]
 def linear_blend_skinning(
     skeleton: Skeleton, rest: NDArray[np.float64], skin: Skin, poses: Poses
 ) -> NDArray[np.float64]:
-    """S' = Σ w_j (rot(q_j, S − J_j) + J_j'), shape (F, V, 3).
+    """Linear blend skinning, S' = Σ w_j (rot(q_j, S − J_j) + J_j') [m], shape (F, V, 3).
 
     Args:
         skeleton: The rest skeleton.
@@ -37,9 +37,11 @@ def linear_blend_skinning(
 def dual_quaternion_skinning(
     skeleton: Skeleton, rest: NDArray[np.float64], skin: Skin, poses: Poses
 ) -> NDArray[np.float64]:
-    """Blend of unit dual quaternions, normalised (Kavan et al., Skinning with Dual Quaternions, 2007), (F, V, 3).
+    """Skinning by the normalised blend of unit dual quaternions [m], shape (F, V, 3) (Kavan et al., *Skinning with
+    Dual Quaternions*, 2007).
 
-    Arguments as for :func:`linear_blend_skinning`. Signs follow the joint of the largest weight.
+    Arguments as for :func:`linear_blend_skinning`. Quaternions are blended with the sign that lies nearest to the one
+    of the joint with the largest weight.
     """
     real = poses.rotations
     move = poses.positions - Rotation.from_quat(real.reshape(-1, 4)).apply(
@@ -66,7 +68,7 @@ def dual_quaternion_skinning(
 
 
 def _half_product(move: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    """½ t q of translations (…, 3) and quaternions (…, 4): the dual part."""
+    """Dual part ½ t q of unit dual quaternions, from translations (…, 3) and quaternions (…, 4)."""
     vector, scalar = turn[..., :3], turn[..., 3:]
     return 0.5 * np.concatenate(
         [scalar * move + np.cross(move, vector), -(move * vector).sum(axis=-1, keepdims=True)], axis=-1

@@ -1,6 +1,6 @@
-"""Binding: where every vertex lies relative to the segments that carry it (A §4, R34–R48).
+"""Binding: coordinates of every vertex relative to the segments whose operators move it (A §4, R34–R48).
 
-Nothing here depends on the pose, and only the placing inside the palm depends on the parameters.
+They do not depend on the pose, and only the weights of palm segments depend on the parameters.
 """
 
 from __future__ import annotations
@@ -18,42 +18,43 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["FLOOR", "OPERATORS", "SIDE_BAND", "STATIONS", "Anchors", "anchor", "smoothstep"]
 
 OPERATORS = 4
-"""Segment operators a vertex may hold (the paper has one; the rest make borders soft)."""
+"""Largest number of segments that move a vertex (the paper has one; more make the borders of domains soft)."""
 
 STATIONS = 5
-"""Places along a pair of neighbouring palm segments where the scale factor λ is evaluated; linear in between."""
+"""Number of places along a pair of neighbouring palm segments where the scale factor λ is evaluated; it is interpolated
+linearly in between."""
 
-# |cosine| below which a vertex is partly external and partly internal: sections near a joint stand upright outside and
-# lean inside, and a wider band shears the sides less
+# |cosine| below which the rules of the external and the internal side are blended: cross-sections near a joint stay
+# upright on the external side and lean on the internal one, and a wider band shears the flanks less
 SIDE_BAND = 0.75
-# share of a proximity that counts across the palm: along a segment there is one at either end, across it one side only;
-# what lies in between then shears over a broad strip
+# factor of proximities across the palm: along a segment there is one at either end, across it on one side only; the
+# area between two segments then is broad, and its shear is spread
 LATERAL = 0.6
-FLOOR = 2e-2  # weight below which an operator is dropped, faded so that nothing jumps
-_ALIKE = 1e-3  # of the largest weight: operators that differ by less from one left out are not faded any further
-_TIES = 1e-9  # weights that differ by less, as sums in another order do, are equal
+FLOOR = 2e-2  # weight below which a segment is dropped; weights fade to zero there, so that they stay continuous
+_ALIKE = 1e-3  # share of the largest weight that fading always leaves, where the first weight left out is as large
+_TIES = 1e-9  # weights that differ by less, as sums in another order do, count as equal
 
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Places of V vertices on up to ``OPERATORS`` segments each.
+    """Coordinates of V vertices relative to up to ``OPERATORS`` segments each.
 
     Attributes:
         ends: Proximal and distal joint of every segment, shape (S, 2).
         muscle: Whether a segment's internal muscle inflates, shape (S,).
-        stiff: Whether all around a segment turns with its bone, as in a skull, shape (S,).
+        stiff: Whether all flesh around a segment turns rigidly with its bone, as on a skull, shape (S,).
         rest: Vertices at rest [m], shape (V, 3).
         segment: Segments of a vertex, shape (V, 4).
         weight: Their weights, rows summing to one; unused ones are zero, shape (V, 4).
         ratio: Projection on the segment, 0 at the proximal joint, 1 at the distal one, clamped except beyond
             extremities, shape (V, 4) (R37, C1).
-        side: 1 on the external side, 0 on the internal, between over a band of R45's cosine, shape (V, 4).
+        side: 1 on the external side, 0 on the internal, blended over a band of R45's cosine, shape (V, 4).
         pairs: Segments of every pair of palm neighbours, shape (N, 2).
-        pair: Palm pairs between which a vertex lies, shape (V, 2), and
-        between: how much it lies in between, 0 on either segment, 1 in the middle, shape (V, 2) (R44, R49);
-        station: where along the pair, 0 … STATIONS − 1, shape (V, 2).
-        rigid: Joint that a vertex without flesh follows with its bone, -1 for all others, shape (V,). Such a vertex has
-            no weight on any segment.
+        pair: Palm pairs between which a vertex lies, shape (V, 2).
+        between: Weight of the thickening by these pairs, 0 on either segment, 1 in the middle, shape (V, 2) (R44, R49).
+        station: Position along these pairs, 0 … STATIONS − 1, shape (V, 2).
+        rigid: Joint whose bone a rigid vertex follows, -1 for flesh, shape (V,). A rigid vertex has no weight on any
+            segment.
     """
 
     ends: NDArray[np.int32]
@@ -84,22 +85,22 @@ def anchor(
     rigid: NDArray[np.int32] | None = None,
     chunk: int = 100_000,
 ) -> Anchors:
-    """Place vertices on the segments of their domains.
+    """Compute the coordinates of vertices on the segments of their domains.
 
     Args:
         vertices: Rest positions [m], shape (V, 3).
         skeleton: The rest skeleton.
         groups: Operators, from :func:`~warpjld.covering.operators.fans`.
         domains: Weight of every fan, shape (V, fans).
-        parameters: Their proximities set how wide the palm's in-between areas are (A Fig. 7).
-        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); all is flesh by default.
-        chunk: Vertices placed at a time, which bounds memory.
+        parameters: Their proximities set how wide the areas between palm segments are (A Fig. 7).
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); by default all vertices are flesh.
+        chunk: Vertices processed at a time, which bounds memory.
     """
     ends = segment_ends(groups)
     table = SegmentTable.build(skeleton, ends)
     pairs, pair_of_fan = _neighbour_pairs(groups)
     rows = [
-        _anchor_some(vertices[i : i + chunk], table, groups, domains[i : i + chunk], parameters, pair_of_fan)
+        _anchor_chunk(vertices[i : i + chunk], table, groups, domains[i : i + chunk], parameters, pair_of_fan)
         for i in range(0, len(vertices), chunk)
     ]
     joined = [np.concatenate(column) for column in zip(*rows, strict=True)]
@@ -113,7 +114,7 @@ def anchor(
 
 
 def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[int, int]]:
-    """All pairs of neighbours, and the number of each fan's first pair."""
+    """All pairs of neighbouring segments, shape (N, 2), and the index of each fan's first pair."""
     pairs: list[tuple[int, int]] = []
     first: dict[int, int] = {}
     segment = 0
@@ -124,7 +125,7 @@ def _neighbour_pairs(groups: tuple[Fan, ...]) -> tuple[NDArray[np.int32], dict[i
     return np.array(pairs, dtype=np.int32).reshape(-1, 2), first
 
 
-def _anchor_some(
+def _anchor_chunk(
     points: NDArray[np.float64],
     table: SegmentTable,
     groups: tuple[Fan, ...],
@@ -132,6 +133,7 @@ def _anchor_some(
     parameters: Parameters,
     pair_of_fan: dict[int, int],
 ) -> tuple[NDArray, ...]:
+    """The arrays of :class:`Anchors` for some vertices: segment, weight, ratio, side, pair, between, station."""
     count, segments = len(points), len(table.ends)
     t = table.project(points)
     weight = np.zeros((count, segments))
@@ -148,7 +150,7 @@ def _anchor_some(
             share = _share_in_fan(points, table, t, inside, parameters)
             weight[:, inside] = domains[:, f, None] * share
             where = slice(pair_of_fan[f], pair_of_fan[f] + size - 1)
-            # weights of both neighbours make the product vanish wherever the pair is not the vertex's own
+            # the product of both weights vanishes at vertices that do not lie between the two segments
             between[:, where] = domains[:, f, None] * 4.0 * share[:, :-1] * share[:, 1:]
             place = np.clip((t[:, inside][:, :-1] + t[:, inside][:, 1:]) / 2.0, 0.0, 1.0)
             along_pair[:, where] = place * (STATIONS - 1)
@@ -159,17 +161,17 @@ def _anchor_some(
     offset = points[:, None] - (table.start[best] + ratio[..., None] * table.along[best])
     side = _side(offset, table.normals[best], np.clip(ratio, 0.0, 1.0))
     stiff = np.array([fan.stiff for fan in groups for _ in fan.segments])[best]
-    # half-way along and outside nothing rounds: there, all turns with the bone
+    # at mid-segment on the external side there is no rounding, only the bone's rotation
     ratio, side = np.where(stiff, 0.5, ratio), np.where(stiff, 1.0, side)
     station = np.take_along_axis(along_pair, pair, axis=1)
     return best.astype(np.int32), kept, ratio, side, pair, pair_kept, station
 
 
 def _side(offset: NDArray[np.float64], normals: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """External side (1) or internal (0) by R45's cosine, blended along the segment.
+    """External side (1) or internal (0) by R45's cosine, blended along the segment, shape (V, 4).
 
-    Judged with the normals of both joints one by one: hip and knee bend in opposite senses, and half-way along a thigh
-    an interpolated normal would vanish and turn over.
+    The cosine is evaluated with the normal of each joint, and the results are interpolated: hip and knee bend in
+    opposite senses, and half-way along a thigh an interpolated normal would vanish and flip.
     """
     length = np.maximum(np.linalg.norm(offset, axis=2), 1e-12)
     height = np.einsum("vok,voek->voe", offset, normals)
@@ -185,15 +187,16 @@ def _share_in_fan(
     inside: slice,
     parameters: Parameters,
 ) -> NDArray[np.float64]:
-    """Weights of side-by-side segments, of which at most two neighbours hold a vertex, shape (V, segments).
+    """Weights of side-by-side segments, of which at most two neighbours are not zero, shape (V, segments).
 
     R_k, the ratio on the virtual segment from segment k to k + 1, is remapped to 0 within the first's proximity and to
-    1 within the second's (areas 1-4-7, 2-5-8 and 3-6-9 of A Fig. 7). The sum of all R counts the neighbours passed:
-    between two of them it gives the paper's 1 − R and R, and it stays continuous where the nearest segment changes and
-    where the virtual segments contradict each other.
+    1 within the second's (areas 1-4-7, 2-5-8 and 3-6-9 of A Fig. 7). The sum of all R_k is a continuous segment index:
+    between two segments it gives the paper's weights 1 − R and R, and it stays continuous where the nearest segment
+    changes and where virtual segments contradict each other.
 
-    Virtual segments of neighbours that begin at one joint, as in the carpus, join points at the fan's largest ratio:
-    the projections themselves would fall together at that joint and R lose its sense while other segments still differ.
+    Virtual segments of neighbours that begin at the same joint, as in the carpus, connect points at the fan's largest
+    ratio: the projections themselves would coincide at that joint, and R would be undefined where other segments are
+    still apart.
     """
     start, along, ends = table.start[inside], table.along[inside], table.ends[inside]
     place = np.clip(t[:, inside], 0.0, 1.0)
@@ -212,7 +215,7 @@ def _share_in_fan(
             + np.clip(r, 0.0, 1.0) * parameters.proximity[ends[n, 1], 1]
             for n, r in ((k, first), (k + 1, second))
         ]
-        # an in-between area is left even where proximities are as large as can be
+        # some area between the segments is left even with the largest proximities
         room = np.maximum(1.0 - LATERAL * (widths[0] + widths[1]), 0.1)
         passed += np.clip((across - LATERAL * widths[0]) / room, 0.0, 1.0)
     for k in range(len(start)):
@@ -221,10 +224,10 @@ def _share_in_fan(
 
 
 def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The ``OPERATORS`` largest weights of every row, faded to zero where another would take their place.
+    """Indices and values of the ``OPERATORS`` largest weights of every row, shape (V, OPERATORS) each.
 
-    Equal ones go to the first segments; where five and more share a vertex alike, nothing can fade, and the first four
-    share it.
+    The values are continuous: they fade to zero where the next weight would replace them. Ties go to the segments of
+    lower index; where five or more weights are equal, nothing can fade, and the first four are kept.
     """
     keep = min(OPERATORS, weight.shape[1])
     order = np.argsort(-_TIES * np.round(weight / _TIES), axis=1, kind="stable")
@@ -241,6 +244,7 @@ def _strongest(weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[
 
 
 def _strongest_pairs(between: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """The two palm pairs of every vertex with the largest weights, less the third largest, shape (V, 2) each."""
     order = np.argsort(-between, axis=1)[:, :2]
     kept = np.take_along_axis(between, order, axis=1)
     third = np.sort(between, axis=1)[:, -3] if between.shape[1] > 2 else np.zeros(len(between))
@@ -248,6 +252,6 @@ def _strongest_pairs(between: NDArray[np.float64]) -> tuple[NDArray[np.int32], N
 
 
 def smoothstep(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """0 below 0, 1 above 1, x² (3 − 2 x) between: without an edge at either."""
+    """Smoothstep: 0 below 0, 1 above 1, x² (3 − 2 x) between, with continuous first derivative."""
     x = np.clip(x, 0.0, 1.0)
     return np.asarray(x * x * (3.0 - 2.0 * x))

@@ -1,9 +1,9 @@
-"""Fitting the parameters to a rig: volume kept over its joint ranges, without folds, roughness or stretch.
+"""Fit of the amplitudes to a rig: volume preserved over its joint ranges, without folds, roughness or stretch.
 
-Only amplitudes are fitted: positions are linear in them, so Gauss–Newton takes a few steps and nothing is diffused
-anew. What shapes the fields (proximities, peaks, exponents) changes little once they are diffused. No pose may get
-rougher or lose volume on the way; folds, which have no derivative, are counted afterwards, and what makes them goes
-back towards the start.
+Only amplitudes are fitted: positions are linear in them, so Gauss–Newton takes a few steps and no field is diffused
+again. The parameters that shape the fields (proximities, peaks, exponents) change little once these are diffused.
+Constraints keep all_poses pose from getting rougher or losing volume; folds, which have no derivative, are counted
+afterwards, and the amplitudes that cause them are moved back towards their start.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Calibration", "CalibrationStatus", "calibrate"]
 
-_HIGHEST = 1.0  # amplitude at full flexion: the skin then is twice as far from the bone
-_PULL = 0.3  # of the squared change of an amplitude: keeps at the start what the surface does not determine
+_HIGHEST = 1.0  # upper bound of amplitudes: at full flexion the skin then is twice as far from the bone
+_PULL = 0.3  # weight of the squared change of an amplitude: regularises what the surface does not determine
 
 
 class CalibrationStatus(Enum):
-    """How a calibration ended; the values are for people."""
+    """How a calibration ended; the values are messages for users."""
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "stopped at the iteration limit"
@@ -44,20 +44,20 @@ class CalibrationStatus(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What :func:`calibrate` found.
+    """Result of :func:`calibrate`.
 
     Attributes:
-        parameters: The best found; in no pose of the sets worse than the start, within ``Tolerances``.
+        parameters: The best parameters found; in no pose worse than the start, within ``Tolerances``.
         status: How it ended.
         iterations: Steps of the minimiser.
         evaluations: Evaluations of the loss with its derivatives.
         seconds: Time taken.
         poses: Poses fitted to.
-        guards: Poses guarded besides.
-        kept: Joints that were taken back towards the start, since poses in which they bend got worse.
-        loss: What is made small, at the start and with ``parameters``.
-        before: Measures of all poses at the start, those fitted to first, and
-        after: with ``parameters``.
+        guards: Further poses that were not allowed to get worse.
+        kept: Joints whose amplitudes were moved back towards the start, since poses in which they bend got worse.
+        loss: Value of the loss, at the start and with ``parameters``.
+        before: Measures of all poses at the start, those fitted to first.
+        after: The same with ``parameters``.
     """
 
     parameters: Parameters
@@ -93,11 +93,11 @@ def calibrate(
         covering: A bound surface; its parameters are the start.
         poses: Poses to fit to, over the joint ranges; by default
             :func:`~warpjld.covering.pose_sets.calibration_poses`.
-        guards: More poses that may not get worse; by default :func:`~warpjld.covering.pose_sets.guard_poses`.
-        iterations: Most steps of the minimiser.
+        guards: Further poses that may not get worse; by default :func:`~warpjld.covering.pose_sets.guard_poses`.
+        iterations: Maximum number of evaluations of the loss.
         weights: Weights of the loss.
-        tolerances: What makes a pose worse.
-        progress: Called with what is being done, how much of it is done, and how much there is.
+        tolerances: By how much a pose may be worse than at the start.
+        progress: Called with the name of the phase, its steps done, and the number of its steps.
 
     Raises:
         InputError: Fewer than one iteration, no poses, or poses of another skeleton.
@@ -120,16 +120,16 @@ def calibrate(
     if not len(poses):
         raise InputError("poses: want at least one to calibrate on")
     if not len(covering.flesh.faces):
-        raise InputError("calibrate: all of this surface is rigid, nothing is deformed")
-    for some in (poses, guards):
-        covering.check(some)
+        raise InputError("calibrate: all of this surface is rigid; want flesh that deforms")
+    for pose_set in (poses, guards):
+        covering.check(pose_set)
     started = time.perf_counter()
-    tell = progress or (lambda what, done, total: None)
-    every = _both(poses, guards)
+    report = progress or (lambda what, done, total: None)
+    all_poses = _concatenated(poses, guards)
     losses = PoseLosses(
-        covering, every, len(poses), weights, tolerances, lambda done, total: tell("posing", done, total)
+        covering, all_poses, len(poses), weights, tolerances, lambda done, total: report("posing", done, total)
     )
-    guard = Guard(covering, every, losses, tolerances, lambda done, total: tell("measuring", done, total))
+    guard = Guard(covering, all_poses, losses, tolerances, lambda done, total: report("measuring", done, total))
     start = amplitudes_of(covering.parameters)
     fit = minimise_constrained(
         losses.parts,
@@ -137,9 +137,9 @@ def calibrate(
         (np.zeros_like(start), np.maximum(start, _HIGHEST)),
         np.full(len(start), _PULL),
         evaluations=iterations,
-        progress=lambda done, total: tell("fitting", done, total),
+        progress=lambda done, total: report("fitting", done, total),
     )
-    amplitudes, after, kept = retreat(covering, fit.x, losses, guard, tell)
+    amplitudes, after, kept = retreat(covering, fit.x, losses, guard, report)
     status = CalibrationStatus.CONVERGED if fit.converged else CalibrationStatus.ITERATION_LIMIT
     if np.array_equal(amplitudes, start):
         status = CalibrationStatus.UNCHANGED
@@ -159,7 +159,7 @@ def calibrate(
     )
 
 
-def _both(poses: Poses, more: Poses) -> Poses:
+def _concatenated(poses: Poses, more: Poses) -> Poses:
     return Poses(
         np.concatenate([poses.positions, more.positions]),
         np.concatenate([poses.rotations, more.rotations]),

@@ -1,4 +1,4 @@
-"""Whether one covering is worse than another in any pose: volume, folds and roughness, measured on what it deforms."""
+"""Comparison of calibrated coverings with the original, pose by pose: volume, folds and roughness of the surfaces."""
 
 from __future__ import annotations
 
@@ -19,26 +19,27 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Guard", "PoseMeasures", "copy_of"]
 
-_SHARP = np.radians(70.0)  # growth of a dihedral angle without which skin does not cross itself, and
-_RINGS = 3  # of faces around such hinges, among which crossings are looked for
-_PLATES = 0.02  # of all faces: so many cross others at rest where a surface is made of plates
+_SHARP = np.radians(70.0)  # growth of a dihedral angle above which self-intersections are searched for
+_RINGS = 3  # rings of faces around such hinges that are searched
+_PLATES = 0.02  # share of faces that intersect others at rest, above which a surface counts as made of plates
 _BLOCK = 16  # poses deformed at once
-_FACES_SEARCHED = 1_000_000  # for crossings, in all poses together
+_FACES_SEARCHED = 1_000_000  # limit of faces searched for intersections, over all poses
 
 
 @dataclass(frozen=True, eq=False)
 class PoseMeasures:
-    """Measures of F poses.
+    """Quality measures of the deformed surface in F poses.
 
     Attributes:
         volume: Relative change of the volume of the flesh, shape (F,).
         roughness: RMS growth of dihedral angles beyond rest [rad], shape (F,).
-        least, largest: Edge stretch of what amplitudes move, shape (F,).
-        folds: Faces that cross others of the same part or of one that it joins on to, and did not at rest, shape (F,).
-            They are looked for where the skin is sharply bent, in as many poses as are quickly searched.
-        contacts: Faces that cross those of another part, likewise.
-        folded: Vertices of the former in each pose.
-        sharper: Squared growth of the dihedral angles that amplitudes change [rad²], in each pose.
+        least, largest: Smallest and largest edge stretch (length over rest length) where amplitudes move the surface,
+            shape (F,).
+        folds: Number of faces that intersect others of the same or of an adjacent part, and did not at rest, shape
+            (F,). They are searched for near sharp bends only, and in the first poses only (``_FACES_SEARCHED``).
+        contacts: Number of faces that intersect those of other parts, likewise.
+        folded: Vertices of the faces in ``folds``, one array a pose.
+        sharper: Squared growth of the dihedral angles that amplitudes change [rad²], one array a pose.
     """
 
     volume: NDArray[np.float64]
@@ -52,15 +53,15 @@ class PoseMeasures:
 
     @staticmethod
     def of_none(poses: int) -> PoseMeasures:
-        """Of poses that are not measured yet."""
+        """Zeros for poses that are not measured yet."""
         volume, roughness, least, largest = np.zeros((4, poses))
         folds, contacts = np.zeros((2, poses), dtype=np.int64)
         folded, sharper = [np.zeros(0, dtype=np.int64)] * poses, [np.zeros(0)] * poses
         return PoseMeasures(volume, roughness, least, largest, folds, contacts, folded, sharper)
 
     def summary(self) -> dict[str, float | int]:
-        """Of all poses: volume error as a root of the mean square and the worst one [%], roughness as a root of the
-        mean square and the worst [degrees], stretch, and faces summed up."""
+        """Over all poses: RMS and worst volume error [%], RMS and worst roughness [degrees], extreme stretches, and
+        total numbers of faces."""
         worst = int(np.abs(self.volume).argmax())
         return {
             "volume_rms": 100.0 * float(np.sqrt((self.volume**2).mean())),
@@ -75,13 +76,15 @@ class PoseMeasures:
 
 
 class Guard:
-    """Measures coverings of one surface in the same poses, and compares them to the first.
+    """Measures coverings of one surface in the same poses, and compares them with the first.
 
     Args:
-        covering: What others are compared to; they differ from it in amplitudes.
+        covering: The reference; others differ from it in amplitudes only.
         poses: F poses.
-        losses: Of these poses: what amplitudes move in each, nothing else is looked at.
-        tolerances: What counts as worse.
+        losses: Losses of these poses; they give the vertices that amplitudes move in each, to which searches are
+            restricted.
+        tolerances: By how much a pose may be worse than with the reference.
+        progress: Called with the number of poses measured, and of all.
     """
 
     def __init__(
@@ -99,9 +102,9 @@ class Guard:
         self._edges, self.hinges = unique_edges(flesh.faces), hinges(flesh.faces)
         self._dihedral = dihedral_angles(self._rest, self.hinges)
         parts = surface_parts(covering)
-        # faces of the flesh are some of the surface's, in its order
-        soft = (covering.anchors.rigid[surface.faces] < 0).any(axis=1)
-        self._parts = parts.of_face[soft]
+        # the faces of the flesh are a subset of the surface's, in the same order
+        is_flesh = (covering.anchors.rigid[surface.faces] < 0).any(axis=1)
+        self._parts = parts.of_face[is_flesh]
         self._joined = _joined(parts.names, covering.skeleton.names, covering.skeleton.parents)
         crossing = crossing_faces(self._rest, flesh.faces)
         self._crossing = _keys(crossing, len(flesh.faces))
@@ -119,17 +122,25 @@ class Guard:
         into: PoseMeasures,
         progress: Callable[[int, int], None] | None = None,
     ) -> None:
-        """Measure some poses of a covering."""
+        """Measure some poses of a covering.
+
+        Args:
+            covering: The covering.
+            which: Indices of the poses.
+            into: Its entries of these poses are overwritten.
+            progress: Called with the number of poses measured, and of all.
+        """
         for done, f in enumerate(which.tolist()):
             if done % _BLOCK == 0:
-                some = which[done : done + _BLOCK]
+                chunk = which[done : done + _BLOCK]
                 p = self._poses
-                block = covering.deform(Poses(p.positions[some], p.rotations[some], p.flexion[some]))
+                block = covering.deform(Poses(p.positions[chunk], p.rotations[chunk], p.flexion[chunk]))
             self._measure(block[done % _BLOCK].astype(np.float64), f, into)
             if progress:
                 progress(done + 1, len(which))
 
     def _measure(self, points: NDArray[np.float64], f: int, into: PoseMeasures) -> None:
+        """Write the measures of a deformed surface (V, 3) into ``into`` at pose ``f``."""
         inside = np.zeros(len(points), dtype=bool)
         inside[self._moved[f]] = True
         local = any_of(inside, self.hinges)
@@ -146,7 +157,7 @@ class Guard:
             self._search(points, self._near(inside, sharp), f, into)
 
     def local_hinges(self, pose: int) -> NDArray[np.int64]:
-        """The hinges of ``PoseMeasures.sharper``, shape (H, 4)."""
+        """The hinges whose angles ``PoseMeasures.sharper`` has for a pose, shape (H, 4)."""
         inside = np.zeros(len(self._rest), dtype=bool)
         inside[self._moved[pose]] = True
         return self.hinges[any_of(inside, self.hinges)]
@@ -155,7 +166,7 @@ class Guard:
         return np.maximum(dihedral_angles(points, self.hinges[which]) - self._dihedral[which], 0.0)
 
     def worse(self, measured: PoseMeasures) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-        """Poses that have lost volume, that fold more and that are rougher than at first, shape (F,) each."""
+        """Which poses lost volume, have more folds, and are rougher than with the reference, shape (F,) each."""
         t, first = self._tolerances, self.first
         error, before = np.abs(measured.volume), np.abs(first.volume)
         emptier = error > np.maximum(before + t.volume, t.volume_free)
@@ -165,8 +176,8 @@ class Guard:
         return emptier, folded, rougher
 
     def _near(self, inside: NDArray[np.bool_], sharp: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Vertices near hinges that have become sharp. Of a doll of plates, which cross at rest, all that move: they
-        pass into each other without bending."""
+        """Mask of the vertices near hinges that have become sharp, shape (V,). On a surface of separate plates all
+        vertices that move: plates intersect without bending."""
         if self._plates:
             return inside
         near = np.zeros(len(inside), dtype=bool)
@@ -176,7 +187,7 @@ class Guard:
         return near
 
     def _search(self, points: NDArray[np.float64], near: NDArray[np.bool_], f: int, into: PoseMeasures) -> None:
-        """Count crossings of faces near some vertices."""
+        """Count intersections of the faces at the vertices of a mask, and write them into ``into`` at pose ``f``."""
         faces = np.flatnonzero(any_of(near, self._faces))
         pairs = faces[crossing_faces(points, self._faces[faces]).pairs].reshape(-1, 2)
         pairs = pairs[~np.isin(pairs[:, 0] * len(self._faces) + pairs[:, 1], self._crossing)]
@@ -188,17 +199,18 @@ class Guard:
 
 
 def copy_of(measures: PoseMeasures) -> PoseMeasures:
-    """Measures of other poses can be written into, one by one."""
+    """A deep copy, whose entries can be overwritten pose by pose."""
     return replace(measures, **{name: value.copy() for name, value in vars(measures).items()})
 
 
 def _keys(crossings: Crossings, faces: int) -> NDArray[np.int64]:
+    """One integer for each pair of intersecting faces, shape (pairs,)."""
     pairs = crossings.pairs.astype(np.int64)
     return pairs[:, 0] * faces + pairs[:, 1]
 
 
 def _joined(parts: tuple[str, ...], names: tuple[str, ...], parents: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Whether two parts are the same one or limbs that join on to each other, shape (parts, parts)."""
+    """Whether two parts are the same or adjacent (parent and child in the skeleton), shape (parts, parts)."""
     number = [names.index(p) if p in names else -1 for p in parts]
     out = np.eye(len(parts), dtype=bool)
     for i, a in enumerate(number):

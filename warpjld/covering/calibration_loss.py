@@ -1,8 +1,8 @@
-"""What calibration makes small, pose by pose: lost volume, stretched and squeezed edges, edges sharper than at rest.
+"""Loss that calibration minimises, pose by pose: volume error, edge stretch, and growth of dihedral angles.
 
-Everything is summed up over what the amplitudes move in a pose, and in proportion to it: a finger of a body counts as
-much as one of a hand, and refining a mesh changes little. A pose is also held to what it was at the start: neither its
-roughness nor its volume error shall grow.
+Each term is summed over the part of the surface that amplitudes move in a pose, and divided by its size: a finger of a
+body counts as much as one of a hand, and refining a mesh changes little. Constraints keep the roughness and the volume
+error of each pose from growing beyond those at the start.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from warpjld.geometry.surface import Surface
 
 __all__ = ["LossTerms", "LossWeights", "PoseLoss", "SurfaceLoss"]
 
-_STRETCHED = 0.5  # logarithm of stretch, and
-_SHARP = 1.0  # growth of a dihedral angle [rad], from which on edges weigh with the fourth power: creases and folds
-_SHORTEST = 1e-3  # stretch at which the logarithm is cut off
-_THINNEST = 0.05  # height of a face, of that at rest, below which dihedral angles are not followed more steeply
-_SLENDER = 60.0  # stiffness of a hinge between faces that have no height
-_AIM = 0.9  # of the roughness that a pose may gain
+_STRETCHED = 0.5  # logarithm of stretch beyond which its term grows with the fourth power
+_SHARP = 1.0  # growth of a dihedral angle [rad] beyond which its term does (creases and folds)
+_SHORTEST = 1e-3  # lower bound of stretch in the logarithm
+_THINNEST = 0.05  # share of a face's height at rest below which derivatives of dihedral angles grow no further
+_SLENDER = 60.0  # largest stiffness of a hinge, for faces of hardly any height
+_AIM = 0.9  # share of the tolerated growth of roughness that the constraint allows
 _SAMPLE = 6000
-"""Edges and hinges of a pose that are looked at; of more, those that are stretched or sharp and a part of the others
-stand for all."""
+"""About the largest number of edges, and of hinges, evaluated in a pose. More are sampled at random, the most stretched
+or sharpest with the highest probability."""
 
 
 @dataclass(frozen=True)
 class LossWeights:
-    """Weights of the terms.
+    """Weights of the terms of the loss.
 
     Attributes:
-        volume: Of the squared volume error, of the volume that is moved.
-        stretch: Of the mean squared logarithm of edge stretch.
-        roughness: Of the squared growth of dihedral angles [rad²], by edge length over the height of the faces beside
-            it: the bending energy of a discrete shell (Grinspun et al. 2003), of each joint that bends.
+        volume: Weight of the squared volume error, relative to the volume that is moved.
+        stretch: Weight of the mean squared logarithm of edge stretch.
+        roughness: Weight of the squared growth of dihedral angles [rad²] times edge length over the height of the
+            adjacent faces: the bending energy of a discrete shell (Grinspun et al. 2003), per joint that bends.
     """
 
     volume: float = 200.0
@@ -52,7 +52,7 @@ class LossWeights:
 
 @dataclass(frozen=True)
 class LossTerms:
-    """The terms of one pose, weighted."""
+    """Weighted terms of the loss of one pose."""
 
     volume: float
     stretch: float
@@ -65,13 +65,14 @@ class LossTerms:
 
 
 class SurfaceLoss:
-    """What the losses of all poses of a surface share.
+    """Quantities of the rest surface that the losses of all poses share.
 
     Args:
         surface: The rest surface.
-        axis: Where each vertex hangs on the skeleton at rest [m], shape (V, 3): says which volume lies behind it.
+        axis: Foot point of each vertex on the skeleton at rest [m], shape (V, 3); the volume between the two is
+            attributed to the vertex.
         weights: Weights of the terms.
-        tolerances: What a pose may be worse by.
+        tolerances: By how much a pose may be worse than at the start.
     """
 
     def __init__(
@@ -102,29 +103,29 @@ class SurfaceLoss:
         return float((np.maximum(growth, 0.0) ** 2).sum())
 
     def region(self, frame: Frame) -> float:
-        """Volume that a pose moves [m³]: what lies between the skeleton and the vertices that amplitudes move."""
+        """Volume between the skeleton and the vertices that amplitudes move in a pose [m³]."""
         return float(max(self.behind[frame.moved].sum(), 1e-9 * abs(self.closed.volume)))
 
     def pose(
         self, frame: Frame, start: NDArray[np.float64], still: float, *, only_held: bool = False
     ) -> PoseLoss | None:
-        """The loss of a pose as a function of amplitudes; None where they move nothing.
+        """The loss of a pose as a function of amplitudes; None where they do not move any vertex.
 
         Args:
             frame: The pose.
-            start: Amplitudes at which ``frame.points`` are, shape (P,).
-            still: Sharpness of what they do not move [rad²].
-            only_held: Whether it is only not to get worse.
+            start: Amplitudes of ``frame.points``, shape (P,).
+            still: Result of :meth:`still` [rad²].
+            only_held: Whether the pose has constraints only, and no terms of the loss.
         """
         return PoseLoss(self, frame, start, still, only_held) if len(frame.moved) else None
 
 
 class PoseLoss:
-    """The loss of one pose, over the edges and hinges that its amplitudes move; made by ``SurfaceLoss.pose``.
+    """The loss of one pose, over the edges and hinges that amplitudes move; made by ``SurfaceLoss.pose``.
 
     Attributes:
-        parameters: Amplitudes that move anything, shape (p,).
-        before: Its terms at the start.
+        parameters: Indices of the amplitudes that move any vertex, shape (p,).
+        before: The terms at the start.
     """
 
     def __init__(
@@ -165,7 +166,7 @@ class PoseLoss:
         self._edges, self._hinges, self._points = number[edges], number[hinged], points[used]
         self._directions = _dense(directions, number[frame.moved], len(used))
 
-        # a little less than what counts as worse: what is sampled here is not all there is
+        # stricter than the tolerance, since only a sample of the hinges is evaluated here
         growth = 1.0 + _AIM * (may.roughness - 1.0)
         rough = float((self._times * self._growth(self._points) ** 2).sum())
         count = max(len(shared.hinges), 1)
@@ -174,11 +175,12 @@ class PoseLoss:
         self.before = self._terms(self._points, self._volume.constant)
 
     def terms(self, amplitudes: NDArray[np.float64]) -> LossTerms:
-        """Of all amplitudes, shape (P,)."""
+        """Terms of the loss at all amplitudes, shape (P,)."""
         change = amplitudes[self.parameters] - self._start
         return self._terms(self._at(change), self._volume.lost(change)[0])
 
     def _terms(self, points: NDArray[np.float64], lost: float) -> LossTerms:
+        """Terms at positions of the sampled vertices and a volume error [m³]."""
         log, growth = self._logarithms(points)[0], self._growth(points)
         return LossTerms(
             float((self._of_volume * lost) ** 2),
@@ -187,8 +189,8 @@ class PoseLoss:
         )
 
     def linearised(self, amplitudes: NDArray[np.float64]) -> Linearised:
-        """Numbers whose squares sum to the loss; squared roughness and volume error, beyond what they may be, as
-        shares of that and of what is moved."""
+        """Residuals, whose squares sum to the loss, and constraints at all amplitudes, shape (P,): squared roughness
+        relative to its limit, and volume error relative to the volume that is moved."""
         change = amplitudes[self.parameters] - self._start
         points = self._at(change)
         lost, by_lost = self._volume.lost(change)
@@ -223,7 +225,12 @@ class PoseLoss:
         return np.asarray(self._points + self._directions @ change)
 
     def _by_amplitude(self, corners: NDArray[np.int64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives by amplitudes, (N, p), from those by the positions of corners (N, k): (N, k, 3)."""
+        """Derivatives of N numbers by amplitudes, shape (N, p).
+
+        Args:
+            corners: Points that each number depends on, shape (N, k).
+            slopes: Derivatives by their positions, shape (N, k, 3).
+        """
         count, width = len(corners), 3 * corners.shape[1]
         column = (3 * corners[:, :, None] + np.arange(3)).ravel()
         directions = self._directions.reshape(-1, len(self.parameters))
@@ -243,7 +250,13 @@ class PoseLoss:
 
 
 def _dense(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> NDArray[np.float64]:
-    """D of vertices, rows x, y, z (3 n, p), as D of numbered points, (count, 3, p); those of number -1 are left out."""
+    """Derivatives (3 n, p), rows x, y, z of n vertices, as a dense array (count, 3, p).
+
+    Args:
+        directions: The derivatives.
+        number: Row of each vertex in the result, -1 for those left out, shape (n,).
+        count: Number of rows.
+    """
     out = np.zeros((count, 3, directions.shape[1]))
     entries = directions.tocoo()
     row, axis = np.divmod(entries.coords[0], 3)
@@ -253,7 +266,8 @@ def _dense(directions: sp.csr_array, number: NDArray[np.int64], count: int) -> N
 
 
 def _sampled(chosen: NDArray[np.int64], weight: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """At most about ``_SAMPLE`` of what is chosen, those that weigh most for certain, and how many each stands for."""
+    """About ``_SAMPLE`` of the chosen elements at most, drawn with probabilities that grow with their weight, and the
+    inverse of each one's probability, by which it counts."""
     if len(chosen) <= _SAMPLE:
         return chosen, np.ones(len(chosen))
     likely = weight / max(float(weight.sum()), 1e-30) + 1.0 / len(chosen)
@@ -263,7 +277,7 @@ def _sampled(chosen: NDArray[np.int64], weight: NDArray[np.float64]) -> tuple[ND
 
 
 def _steeper(x: NDArray[np.float64], beyond: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """x √(1 + (x / beyond)²) and its derivative: squared, x² for small x and x⁴ for large ones."""
+    """x √(1 + (x / beyond)²) and its derivative: its square grows as x² for small x and as x⁴ for large ones."""
     ratio = (x / beyond) ** 2
     root = np.sqrt(1.0 + ratio)
     return x * root, (1.0 + 2.0 * ratio) / root
@@ -277,7 +291,7 @@ def _lengths(points: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[n
 def _volume_behind(
     rest: NDArray[np.float64], faces: NDArray[np.int32], axis: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Volume between each vertex's share of the surface and the skeleton [m³], shape (V,)."""
+    """Volume between each vertex's share of the surface and its foot point on the skeleton [m³], shape (V,)."""
     a, b, c = (rest[faces[:, k]] for k in range(3))
     height = (a + b + c - axis[faces].sum(axis=1)) / 3.0
     third = (height * np.cross(b - a, c - a)).sum(axis=1) / 18.0
@@ -286,8 +300,8 @@ def _volume_behind(
 
 
 def _stiffness(rest: NDArray[np.float64], hinge: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Edge length over a third of the mean height of the faces beside it, and the least doubled areas of those faces
-    that slopes may divide by [m²], shape (H, 2)."""
+    """Bending stiffness of each hinge, shape (H,): edge length over a third of the mean height of its two faces. And
+    lower bounds of these faces' doubled areas as divisors in derivatives [m²], shape (H, 2)."""
     i, j, k, m = (rest[hinge[:, n]] for n in range(4))
     along = np.linalg.norm(j - i, axis=1)
     areas = np.stack([np.linalg.norm(np.cross(j - i, other - i), axis=1) for other in (k, m)], axis=1)

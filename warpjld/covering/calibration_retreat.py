@@ -1,4 +1,4 @@
-"""From fitted amplitudes back to where no pose is worse than at the start, each amplitude only as far as it must go."""
+"""Backtracking of fitted amplitudes until no pose is worse than at the start, each no further than necessary."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from warpjld.covering.pose_losses import PoseLosses
 
 __all__ = ["retreat"]
 
-_ROUNDS = 2  # after which what makes a pose worse goes back all the way
-_LEFT = (1.0, 0.4, 0.0)  # of an amplitude's change, each time that it makes a pose worse
-_SHARE = 0.3  # of what the amplitude does that does most in the same place, from which on one is held responsible
+_ROUNDS = 2  # rounds after which amplitudes that make a pose worse go back to their start at once
+_LEFT = (1.0, 0.4, 0.0)  # share of an amplitude's change that is kept, one level further each time it is responsible
+_SHARE = 0.3  # effect relative to the strongest amplitude's in the same place, above which one is responsible
 
 
 def retreat(
@@ -26,19 +26,19 @@ def retreat(
     fitted: NDArray[np.float64],
     losses: PoseLosses,
     guard: Guard,
-    tell: Callable[[str, int, int], None],
+    report: Callable[[str, int, int], None],
 ) -> tuple[NDArray[np.float64], PoseMeasures, tuple[str, ...]]:
-    """Amplitudes between those of a covering and those fitted.
+    """Move fitted amplitudes back towards those of a covering where poses got worse.
 
     Args:
-        covering: At the start.
-        fitted: Amplitudes to begin with, shape (2 J,).
-        losses: Of the poses that ``guard`` measures.
-        guard: Says which poses are worse.
-        tell: Called with what is being done, how much of it is done, and how much there is.
+        covering: The covering at the start.
+        fitted: Fitted amplitudes, shape (2 J,).
+        losses: Losses of the poses that ``guard`` measures.
+        guard: Decides which poses are worse.
+        report: Called with the name of the phase, its steps done, and the number of its steps.
 
     Returns:
-        Amplitudes, measures of all poses with them, and the names of joints some amplitude of which went back.
+        Amplitudes, measures of all poses with them, and the names of joints whose amplitudes were moved back.
     """
     start = amplitudes_of(covering.parameters)
     change = fitted - start
@@ -50,7 +50,7 @@ def retreat(
         amplitudes = start + np.array(_LEFT)[level] * change
         other = covering.with_parameters(with_amplitudes(covering.parameters, amplitudes))
         again = np.array([f for f, p in enumerate(losses.of_pose) if p is not None and changed[p.parameters].any()])
-        guard.measure(other, again.astype(np.int64), measured, lambda done, total: tell("comparing", done, total))
+        guard.measure(other, again.astype(np.int64), measured, lambda done, total: report("comparing", done, total))
         emptier, folded, rougher = guard.worse(measured)
         if not (emptier | folded | rougher).any():
             break
@@ -76,7 +76,7 @@ def retreat(
             level[(blame >= _SHARE) & (level == before)] += 1 if attempt < _ROUNDS else len(_LEFT)
         level = np.minimum(level, len(_LEFT) - 1)
         changed = level != before
-        if not changed.any():  # what is left to go back does nothing for the poses that are worse
+        if not changed.any():  # no single amplitude is responsible for the poses that are worse: reset all
             level[:] = len(_LEFT) - 1
             changed = np.ones(len(start), dtype=bool)
     joints = np.unique(np.flatnonzero(level) % len(covering.skeleton))
@@ -88,7 +88,7 @@ def _relative(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _amplitude_fields(covering: Covering) -> sp.csr_array:
-    """How much each amplitude does at each vertex, shape (V, 2 J)."""
+    """Magnitude of each amplitude's field at each vertex, shape (V, 2 J)."""
     fields, begins = covering.fields, covering.anchors.ends[:, 0]
     joints = len(covering.skeleton)
     of_segment = sp.csr_array((np.ones(len(begins)), (np.arange(len(begins)), begins)), shape=(len(begins), joints))

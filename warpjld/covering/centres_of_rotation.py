@@ -1,8 +1,8 @@
-"""Skinning with optimised centres of rotation (Le and Hodgins 2016), to compare with. NumPy, float64.
+"""Skinning with optimised centres of rotation (Le and Hodgins 2016), as a reference method. NumPy, float64.
 
 Every vertex turns by the blended quaternions of its joints about a centre that moves by linear blending. The centre is
-the mean place of all surface with like weights, so that what is skinned alike turns about one point. Written from the
-paper, without its subdivision of faces whose corners differ much in weights.
+the mean of the surface weighted by similarity of skinning weights, so that vertices with similar weights turn about the
+same point. Written from the paper, without its subdivision of faces whose corners differ much in weights.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def centres_of_rotation(rest: NDArray[np.float64], faces: NDArray[np.int32], ski
     """Centre of every vertex [m], shape (V, 3): p = ∫ s(w_v, w_x) x dx / ∫ s(w_v, w_x) dx over the surface (eq. 1),
 
     s(a, b) = Σ_{j≠k} a_j a_k b_j b_k exp(−(a_j b_k − a_k b_j)² / σ²), with the weights of a face the mean of its
-    corners'. A vertex of one joint alone has none; it gets itself, which linear blending then moves.
+    corners'. For a vertex with the weight of a single joint the integral is zero; its centre is the vertex itself.
 
     Args:
         rest: Rest vertices [m], shape (V, 3).
@@ -50,10 +50,10 @@ def centres_of_rotation(rest: NDArray[np.float64], faces: NDArray[np.int32], ski
         b_j, b_k = of_face[face, j], of_face[face, k]
         step = max(_CHUNK // max(len(face), 1), 1)
         for first, last in pairwise([*range(0, len(vertex), step), len(vertex)]):
-            some = vertex[first:last]
-            a_j, a_k = weights[some, j, None], weights[some, k, None]
-            alike = np.exp(-(((a_j * b_k - a_k * b_j) / _WIDTH) ** 2))
-            total[some] += a_j * a_k * (alike * (b_j * b_k)) @ moment[face]
+            chunk = vertex[first:last]
+            a_j, a_k = weights[chunk, j, None], weights[chunk, k, None]
+            similarity = np.exp(-(((a_j * b_k - a_k * b_j) / _WIDTH) ** 2))
+            total[chunk] += a_j * a_k * (similarity * (b_j * b_k)) @ moment[face]
     found = total[:, 3] > 0.0
     return np.where(found[:, None], total[:, :3] / np.where(found, total[:, 3], 1.0)[:, None], rest)
 
@@ -65,7 +65,9 @@ def centre_of_rotation_skinning(
     centres: NDArray[np.float64],
     poses: Poses,
 ) -> NDArray[np.float64]:
-    """S' = rot(normalise(Σ ± w_j q_j), S − p) + LBS(p), shape (F, V, 3). Signs follow the joint of the largest weight.
+    """S' = rot(normalise(Σ ± w_j q_j), S − p) + LBS(p) [m], shape (F, V, 3), LBS linear blend skinning.
+
+    Quaternions are blended with the sign that lies nearest to the one of the joint with the largest weight.
 
     Args:
         skeleton: The rest skeleton.

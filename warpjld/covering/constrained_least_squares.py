@@ -1,13 +1,13 @@
-"""Sums of squares minimised under inequalities: Gauss–Newton steps that keep to the linearised constraints, damped as
-by Levenberg and Marquardt where they make things worse.
+"""Non-linear least squares under inequality constraints: sequential quadratic programming with the Gauss–Newton
+Hessian, and Levenberg–Marquardt damping of steps that do not lessen the merit function.
 
 Each step solves the quadratic program
 
     min ½ s·H s + g·s,   c + C s ≤ 0,   low ≤ x + s ≤ high,   H = JᵀJ + pull
 
-as a least distance problem, which is one of non-negative least squares in the multipliers λ of the constraints, with
-s = −H⁻¹ (g + Cᵀ λ) (Lawson and Hanson, *Solving Least Squares Problems*, §23). Residuals and constraints come in parts
-that know a few parameters each.
+as a least distance problem, which reduces to non-negative least squares in the multipliers λ of the constraints, with
+s = −H⁻¹ (g + Cᵀ λ) (Lawson and Hanson, *Solving Least Squares Problems*, §23). Residuals and constraints are given in
+blocks that depend on a few parameters each.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from numpy.typing import NDArray
 
 __all__ = ["ConstrainedFit", "Linearised", "ResidualBlock", "minimise_constrained"]
 
-_SETTLED = 1e-3  # relative gain of a step below which the next is not taken
-_VIOLATED = 1e-3  # by all constraints together, above which one more step is taken all the same
-_SHORTER = 0.4  # of a step that made things worse, tried before it is damped
+_SETTLED = 1e-3  # relative decrease of the merit function below which the iteration ends
+_VIOLATED = 1e-3  # sum of constraint violations above which it goes on all the same
+_SHORTER = 0.4  # factor of a rejected step, tried before damping
 _LEAST, _MOST, _DAMPED = 0.1, 1e3, 10.0
-"""Least and largest damping, of the diagonal of H, once a shorter step has not helped, and the factor between two."""
+"""Smallest and largest damping, relative to the diagonal of H, and the factor from one value to the next."""
 
-_TOUCH = 1e-9  # by which a step may pass a constraint
-_IMPOSSIBLE = 1e-9  # residual of the least distance problem where nothing is within its constraints
-_SLACK = 0.02  # of one constraint, beyond which a step is not taken unless it lessens what is violated
-_MULTIPLIED = 2.0  # weight of violated constraints in what a step has to gain, of the largest multiplier
+_TOUCH = 1e-9  # tolerated violation of a linearised constraint by a step
+_IMPOSSIBLE = 1e-9  # residual of the non-negative least squares below which the constraints are infeasible
+_SLACK = 0.02  # largest violation of a constraint by an accepted step, unless the violation was larger before
+_MULTIPLIED = 2.0  # weight of violations in the merit function, relative to the largest multiplier
 
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """A part around some parameters: N residuals and M constraints by p parameters.
+    """A block linearised at some parameters: N residuals and M constraints of p parameters.
 
     Attributes:
-        residuals: r, shape (N,): the sum of squares is made small.
+        residuals: r, shape (N,): their sum of squares is minimised.
         jacobian: dr/dx, shape (N, p).
         constraints: c, shape (M,): wanted ≤ 0.
         slopes: dc/dx, shape (M, p).
@@ -51,23 +51,23 @@ class Linearised:
 
 
 class ResidualBlock(Protocol):
-    """Residuals and constraints that some parameters determine."""
+    """Residuals and constraints that depend on the parameters of the indices ``parameters``, shape (p,)."""
 
     parameters: NDArray[np.int64]
 
     def linearised(self, x: NDArray[np.float64]) -> Linearised:
-        """At all parameters x, shape (P,); derivatives by ``parameters``, (p,)."""
+        """Values at all parameters x, shape (P,), and derivatives by those of ``parameters``."""
 
 
 @dataclass(frozen=True, eq=False)
 class ConstrainedFit:
-    """What :func:`minimise` found.
+    """Result of :func:`minimise_constrained`.
 
     Attributes:
         x: Parameters, shape (P,).
         iterations: Steps taken.
-        evaluations: Times all parts were linearised.
-        converged: Whether the last step gained next to nothing; else the evaluations ran out.
+        evaluations: Times all blocks were linearised.
+        converged: Whether the decrease fell below the tolerance; else the limit of evaluations was reached.
     """
 
     x: NDArray[np.float64]
@@ -78,7 +78,7 @@ class ConstrainedFit:
 
 @dataclass(frozen=True, eq=False)
 class _Sum:
-    """All parts together, by the parameters that any of them moves."""
+    """Half the sum of squares and the constraints of all blocks, with derivatives by the parameters they depend on."""
 
     loss: float
     gradient: NDArray[np.float64]
@@ -107,12 +107,12 @@ def minimise_constrained(
     """Minimise ½ Σ |r(x)|² + ½ Σ pull (x − start)² under c(x) ≤ 0 and within bounds.
 
     Args:
-        parts: Residuals and constraints; parameters that none of them moves stay as they are.
+        parts: Blocks of residuals and constraints; parameters that none of them depends on do not change.
         start: First x, shape (P,), where constraints and bounds hold.
-        bounds: Least and largest x, shape (P,) each.
-        pull: How much each parameter is held at its start, above 0, shape (P,).
-        evaluations: Most times that all parts are linearised.
-        progress: Called with evaluations done, and how many there may be.
+        bounds: Lower and upper bounds of x, shape (P,) each.
+        pull: Weight of each parameter's squared change, above 0, shape (P,).
+        evaluations: Limit of the times that all blocks are linearised.
+        progress: Called with the number of evaluations done, and their limit.
     """
     moved = np.unique(np.concatenate([part.parameters for part in parts])) if parts else np.zeros(0, dtype=np.int64)
     place = np.full(len(start), -1)
@@ -120,18 +120,19 @@ def minimise_constrained(
     low, high, held = bounds[0][moved], bounds[1][moved], pull[moved]
 
     def summed(x: NDArray[np.float64]) -> _Sum:
+        """All blocks and the regularisation, linearised at x."""
         change = (x - start)[moved]
         loss = float((held * change**2).sum())
         gradient, square = held * change, np.diag(held)
         constraints, slopes = [], []
         for part in parts:
             local = part.linearised(x)
-            mine = place[part.parameters]
+            own = place[part.parameters]
             loss += float(local.residuals @ local.residuals)
-            gradient[mine] += local.jacobian.T @ local.residuals
-            square[np.ix_(mine, mine)] += local.jacobian.T @ local.jacobian
+            gradient[own] += local.jacobian.T @ local.residuals
+            square[np.ix_(own, own)] += local.jacobian.T @ local.jacobian
             rows = np.zeros((len(local.constraints), len(moved)))
-            rows[:, mine] = local.slopes
+            rows[:, own] = local.slopes
             constraints.append(local.constraints)
             slopes.append(rows)
         return _Sum(0.5 * loss, gradient, square, np.concatenate(constraints), np.concatenate(slopes))
@@ -140,7 +141,7 @@ def minimise_constrained(
     if not moved.size:
         return ConstrainedFit(x, 0, 0, True)
     here = summed(x)
-    done, taken, weight, damping, part = 1, 0, 0.0, 0.0, 1.0
+    done, taken, weight, damping, length = 1, 0, 0.0, 0.0, 1.0
     while done < evaluations:
         step, largest = _step(here, damping, low - x[moved], high - x[moved])
         weight = max(weight, _MULTIPLIED * largest)
@@ -148,37 +149,37 @@ def minimise_constrained(
         if _predicted(here, step) + weight * here.violated < _SETTLED * merit and here.violated < _VIOLATED:
             return ConstrainedFit(x, taken, done, True)
         candidate = x.copy()
-        candidate[moved] = np.clip(x[moved] + part * step, low, high)
+        candidate[moved] = np.clip(x[moved] + length * step, low, high)
         there = summed(candidate)
         done += 1
         if progress:
             progress(done, evaluations)
         gain = merit - there.loss - weight * there.violated
         if gain > 0.0 and there.worst <= max(here.worst, _SLACK):
-            x, here, taken, part = candidate, there, taken + 1, 1.0
+            x, here, taken, length = candidate, there, taken + 1, 1.0
             damping = damping / _DAMPED if damping > _LEAST else 0.0
             if gain < _SETTLED * merit and here.violated < _VIOLATED:
                 return ConstrainedFit(x, taken, done, True)
-        elif part == 1.0:
-            part = _SHORTER
+        elif length == 1.0:
+            length = _SHORTER
         else:
-            damping, part = max(_DAMPED * damping, _LEAST), 1.0
+            damping, length = max(_DAMPED * damping, _LEAST), 1.0
             if damping > _MOST:
                 return ConstrainedFit(x, taken, done, True)
     return ConstrainedFit(x, taken, done, False)
 
 
 def _predicted(here: _Sum, step: NDArray[np.float64]) -> float:
-    """What a step gains if nothing curves."""
+    """Decrease of the quadratic model of the loss by a step."""
     return -float(here.gradient @ step + 0.5 * step @ (here.square @ step))
 
 
 def _step(
     here: _Sum, damping: float, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """The step of the quadratic program, and the largest multiplier of a constraint that is no bound.
+    """Solution of the quadratic program, and the largest multiplier of its constraints other than bounds.
 
-    Where no step satisfies what is violated, one that violates it no more.
+    Where no step satisfies constraints that are violated, the solution that does not increase their violation.
     """
     unit = np.eye(len(low))
     rows = np.concatenate([here.slopes, unit, -unit])
@@ -194,11 +195,11 @@ def _step(
 def _least_distance(
     lower: NDArray[np.floating], gradient: NDArray[np.float64], rows: NDArray[np.float64], room: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """The s with rows · s ≤ room that makes ½ |Lᵀ s|² + g·s least, and the multipliers of the rows; None where there is
-    no such s."""
+    """Minimiser s of ½ |Lᵀ s|² + g·s under rows · s ≤ room, and the multipliers of the rows; None where no s satisfies
+    them."""
     from scipy.optimize import nnls
 
-    # y = Lᵀ s − t is made short under G y ≥ h
+    # least distance form: minimise |y|, y = Lᵀ s − t, under G y ≥ h
     target = np.linalg.solve(lower, -gradient)
     step = np.linalg.solve(lower.T, target)
     chosen = np.zeros(len(rows), dtype=bool)

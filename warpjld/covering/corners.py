@@ -1,8 +1,8 @@
-"""Saddle corners of a triangulated surface, and how heat must be conducted around them to spread without a spike.
+"""Conductivity around saddle vertices of a triangulated surface, graded so that diffused weights keep finite slopes.
 
-Round a vertex whose angles sum to θ > 2π, as they do in the webs of a coarse hand, heat at rest goes as r^(2π/θ): the
-finer the mesh, the steeper the weights, and so the larger the stretch, without end. With a conductivity of
-r^((2π/θ)² − 1) it goes as r, and the slope stays finite: ν = 1 solves ν (ν + β) = (2π/θ)² for β = (2π/θ)² − 1.
+Round a vertex whose angles sum to θ > 2π, as they do in the webs of a coarse hand, a harmonic function goes as
+r^(2π/θ): the finer the mesh, the steeper the weights, and so the larger the stretch, without bound. With a conductivity
+of r^((2π/θ)² − 1) it goes as r, and the slope stays finite: ν = 1 solves ν (ν + β) = (2π/θ)² for β = (2π/θ)² − 1.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ else:
 __all__ = ["corner_conductivity"]
 
 _REACH = 0.4
-"""Radius within which heat is conducted better, as a share of the thickness at a corner.
+"""Radius within which the conductivity is raised, relative to the thickness of the flesh at the vertex.
 
-Measured against the whole surface, a hand's webs reached over all its fingers where there was a body around it. With .5
-and more the largest stretch of the coarsest hand grows by a tenth at its first refinement."""
+Relative to the size of the whole surface, the radius at a hand's webs covered all its fingers where the hand was part
+of a body. With .5 and more the largest stretch of the coarsest hand grows by a tenth at its first refinement."""
 
-_MARGIN = 1.3  # more than the exponent asks for: cotangents of obtuse triangles are clipped, which spoils it a little
-_SHARP = 1.03  # θ / 2π from which a corner counts: slopes grow by less than this at each halving of the edges otherwise
-_MOST = 4_000  # corners considered, sharpest first: a surface with more of them is noise
-_MOST_PAIRS = 4_000_000  # and triangles near them, all together: where everything lies in one place there is no corner
-_BEST = np.log(1e4)  # conductivity at most, as a logarithm: corners side by side must not add up beyond all numbers
+_MARGIN = 1.3  # factor of the theoretical exponent, since cotangents of obtuse triangles are clipped
+_SHARP = 1.03  # θ / 2π above which a vertex counts as a saddle; below, slopes grow by less at each halving of the edges
+_MOST = 4_000  # saddles considered, largest angle sums first: a surface with more of them is noise
+_MOST_PAIRS = 4_000_000  # limit of triangles near all of them, which bounds memory where vertices coincide
+_BEST = np.log(1e4)  # upper bound of the conductivity's logarithm, where adjacent saddles add up
 
 
 def corner_conductivity(
@@ -42,7 +42,7 @@ def corner_conductivity(
     Args:
         vertices: Vertex positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        thickness: How far the skin lies from its bones at every vertex [m], shape (V,).
+        thickness: Distance of the skin from its bone at every vertex [m], shape (V,).
     """
     turns = _angle_sums(vertices, faces) / (2.0 * np.pi)
     corners = np.argsort(-turns)[:_MOST]
@@ -67,6 +67,7 @@ def corner_conductivity(
 
 
 def _angle_sums(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Sum of the triangle angles at every vertex [rad], shape (V,)."""
     total = np.zeros(len(vertices))
     for k in range(3):
         apex, i, j = (vertices[faces[:, (k + n) % 3]] for n in range(3))

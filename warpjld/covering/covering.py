@@ -32,20 +32,21 @@ from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["Covering"]
 
-_STIFF = 0.75  # how much less far fields reach inside a skull
-_SPLIT_BELOW = 200_000  # vertex-frames a thread must have before splitting pays
+_STIFF = 0.75  # share by which the diffusion length is reduced on a skull
+_SPLIT_BELOW = 200_000  # smallest number of vertices × frames worth a thread of its own
 
 
 class Covering:
-    """The operators of one surface on one skeleton; made by :func:`bind`, then only read.
+    """The operators of one surface on one skeleton; made by :func:`bind`, and immutable from then on.
 
     Attributes:
         skeleton: The rest skeleton.
         surface: The rest surface.
         parameters: The animator's parameters in use.
         fans: The operators.
-        domains: Weight of every operator at every vertex, shape (V, fans); of what is rigid, which it is counted with.
-        anchors: Places of the vertices on their segments.
+        domains: Weight of every operator at every vertex, shape (V, fans); rigid vertices have those of the part they
+            belong to.
+        anchors: Coordinates of the vertices on their segments.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -79,13 +80,12 @@ class Covering:
         return f"{type(self).__name__}({len(self.surface.vertices)} vertices on {len(self.skeleton)} joints)"
 
     def keeping(self, runs: Runs, fields: Callable[[], Fields], swelling: NDArray[np.float64]) -> Covering:
-        """This covering, with what was computed of it before: its runs, its swelling, and its fields when wanted."""
+        """This covering with results computed before: packed runs, swelling, and fields, which are read on demand."""
         self.runs, self._kept, self.swelling = runs, fields, swelling
         return self
 
     def with_parameters(self, parameters: Parameters) -> Covering:
-        """The same binding with other parameters; domains are not computed again, and fields only where parameters
-        other than amplitudes change."""
+        """The same binding with other parameters; domains are kept, and fields too where only amplitudes change."""
         parameters.check(self.skeleton)
         anchors, same = self.anchors, {"diffusion", "following", "spread", "fields", "swelling", "_kept"}
         if not parameters.shapes_like(self.parameters):
@@ -98,17 +98,17 @@ class Covering:
 
     @cached_property
     def diffusion(self) -> Diffusion:
-        """Heat on the flesh, on the scale of its thickness."""
+        """Diffusion of fields over the flesh, with its thickness as the length scale."""
         flesh = np.flatnonzero(self.anchors.rigid < 0)
         vertices, faces = part_of_surface(self.surface.vertices, self.surface.faces, flesh)
-        # a skull needs no room: nothing of it bends, and lids may not leave the eyes
+        # a skull does not bend, so it needs less smoothing, and lids must stay on the eyes
         stiff = self.domains[flesh][:, [fan.stiff for fan in self.fans]].sum(axis=1)
         reach = thickness(self.anchors, self.skeleton.rest)[flesh] * (1.0 - _STIFF * stiff)
         return Diffusion(vertices, faces, reach, flesh)
 
     @cached_property
     def following(self) -> Following | None:
-        """What shells that lie on the skin follow; None where the flesh is one shell."""
+        """Map of fields from the skin to shells that lie on it; None where the flesh is a single shell."""
         lines = self.skeleton.rest[self.anchors.ends]
         return following(self.surface.vertices, self.surface.faces, lines, self.anchors.rigid)
 
@@ -118,13 +118,13 @@ class Covering:
         return self.diffused(operator_fields(self.anchors, self.parameters))
 
     def diffused(self, fields: Fields) -> Fields:
-        """Fields of this surface after diffusion, where shells lie on others those of the skin under them."""
+        """Fields of this surface after diffusion; shells that lie on others get those of the skin beneath."""
         owner = joint_of_column(self.anchors, len(self.skeleton))
         skin = fields.like(self.diffusion.spread(fields.stacked(), owner))
         return skin if self.following is None else self.following.of(skin)
 
     def before_diffusion(self, slopes: Fields, fields: Fields) -> Fields:
-        """Derivatives by ``fields`` of a number whose derivatives by ``diffused(fields)`` are given."""
+        """Adjoint of :meth:`diffused`: derivatives of a number by ``fields``, from those by ``diffused(fields)``."""
         skin = slopes if self.following is None else self.following.adjoint(slopes)
         owner = joint_of_column(self.anchors, len(self.skeleton))
         before = self.diffusion.adjoint(skin.stacked().toarray(), fields.stacked(), owner)
@@ -132,7 +132,7 @@ class Covering:
 
     @cached_property
     def fields(self) -> Fields:
-        """The coefficients in use: diffused, and thinned out."""
+        """The coefficients in use: diffused, and without negligible entries."""
         return thinned(self.spread) if self._kept is None else self._kept()
 
     @cached_property
@@ -142,18 +142,18 @@ class Covering:
 
     @cached_property
     def swelling(self) -> NDArray[np.float64]:
-        """How much flesh swells around every joint at full flexion so that volume is kept, shape (J,); it follows from
-        all but the parameters' amplitudes."""
+        """Swelling amplitude of every joint at full flexion that preserves volume, shape (J,). It does not depend on
+        the amplitudes among the parameters."""
         return volume_keeping(self)
 
     @cached_property
     def flesh(self) -> Surface:
-        """The rest surface without what is rigid: what keeps its volume or not. Vertices keep their numbers."""
+        """The rest surface without rigid faces, whose volume is measured. Vertices keep their indices."""
         return without_rigid(self.surface, self.anchors.rigid)
 
     @cached_property
     def runs(self) -> Runs:
-        """The packed operators."""
+        """The operators packed for the kernel."""
         from warpjld_kernels.covering_runs import CPU_LANES
 
         columns = Columns(len(self.skeleton), len(self.anchors.ends), len(self.anchors.pairs))
@@ -161,7 +161,7 @@ class Covering:
 
     @cached_property
     def run_surface(self) -> Surface:
-        """The rest surface with its vertices in the order of the runs: what ``order="runs"`` gives back."""
+        """The rest surface with its vertices in the order of the runs, as ``order="runs"`` returns them."""
         return self.surface.renumbered(self.runs.order[: len(self.surface.vertices)])
 
     def deform(
@@ -179,9 +179,9 @@ class Covering:
             poses: F poses of the skeleton.
             device: Warp device.
             threads: CPU threads to split the frames over; by default all cores where the batch is worth it.
-            out: Array to fill instead of a new one: a fresh one costs more than the deformation.
-            order: "surface" numbers vertices as ``surface`` does; "runs" as ``run_surface`` does, which is quicker
-                since nothing is scattered.
+            out: Array to fill; allocating a new one costs more than the deformation.
+            order: "surface" numbers vertices as ``surface`` does; "runs" as ``run_surface`` does, which is faster
+                since results are not scattered.
 
         Raises:
             InputError: Poses of another skeleton, not finite poses, an unknown device, or ``out`` of a wrong shape.
@@ -214,14 +214,14 @@ class Covering:
         threads: int | None = None,
         order: Literal["surface", "runs"] = "surface",
     ) -> Iterator[tuple[int, NDArray[np.float32]]]:
-        """Deform a sequence block by block: first frame and vertices (n, V, 3) of each.
+        """Deform a sequence block by block; yields the first frame and the positions [m] (n, V, 3) of each block.
 
         Every block is a view of one buffer that the next block overwrites, so memory does not grow with the sequence.
         """
         buffer = np.empty((min(frames, len(poses)), len(self.surface.vertices), 3), dtype=np.float32)
         for start in range(0, len(poses), frames):
-            some = poses[start : start + frames]
-            yield start, self.deform(some, device=device, threads=threads, out=buffer[: len(some)], order=order)
+            block = poses[start : start + frames]
+            yield start, self.deform(block, device=device, threads=threads, out=buffer[: len(block)], order=order)
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""
@@ -240,13 +240,14 @@ class Covering:
         return result
 
     def chosen(self, vertices: ArrayLike) -> NDArray[np.int32]:
-        """Vertex numbers as an array; InputError where one does not exist."""
+        """Vertex indices as an array, shape (n,); InputError where one is out of range."""
         chosen = np.asarray(vertices, dtype=np.int32)
         if chosen.size and (chosen.min() < 0 or chosen.max() >= len(self.surface.vertices)):
             raise InputError(f"vertices: indices must lie in 0…{len(self.surface.vertices) - 1}")
         return chosen
 
     def _palette(self, poses: Poses) -> Any:
+        """Pose inputs of every frame in the layout that the packed kernel reads."""
         self.check(poses)
         drivers = drive(self.skeleton, self.anchors, poses)
         return palette(self.runs.columns, self.anchors, self.parameters, drivers)
@@ -262,11 +263,12 @@ class Covering:
             raise InputError(f"poses: joint '{self.skeleton.names[joint]}' is not finite at frame {frame}")
 
     def _launch(self, rows: Any, points: Any, device: Any, threads: int, order: str) -> None:
+        """Launch the kernels for all frames of the palette ``rows``, into the device array ``points``."""
         import warp as wp
 
         *model, lane = self._on(device, "runs", self._packed)
         pose = wp.array(rows, dtype=float, device=device, copy=False)
-        # a surface smaller than one tile is one run in its own order, with stand-ins that have no place in ``points``
+        # a surface smaller than one tile is one run in its own order, padded with lanes that have no row in ``points``
         placed = order == "surface" or len(self.runs.order) > points.shape[1]
         if placed and device.is_cpu:
             launch_gathered(model, lane, pose, points, device, threads)
@@ -274,13 +276,14 @@ class Covering:
             launch_runs(model, pose, points, device, threads, scatter=placed)
 
     def _on(self, device: Any, name: str, make: Any) -> list[Any]:
-        """Arguments that stay on a device between calls."""
+        """Kernel arguments that stay on a device between calls, made when first needed."""
         key = f"{device}/{name}"
         if key not in self._resident:
             self._resident[key] = make(device)
         return self._resident[key]
 
     def _packed(self, device: Any) -> list[Any]:
+        """The runs as Warp arrays: tiles, runs, slots, coefficients, order, and lane of each vertex."""
         import warp as wp
 
         r = self.runs

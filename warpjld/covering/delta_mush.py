@@ -1,9 +1,9 @@
-"""Direct delta mush (Le and Lewis 2019, variant 0), to compare with. NumPy and SciPy, float64.
+"""Direct delta mush (Le and Lewis 2019, variant 0), as a reference method. NumPy and SciPy, float64.
 
 Weights and second moments of the rest surface are smoothed over it once; a frame blends them by the bones' transforms
-and takes the rotation nearest to what comes out (polar decomposition). Written from the paper. libigl 2.5.1 evaluates
-the same moments to the same points, but makes others: its LDLᵀ reads only the lower triangle of I + λ D⁻¹ L, which is
-not symmetric, so that constants are not kept; with that copied, its moments come out to rounding.
+and takes the nearest rotation of the result (polar decomposition). Written from the paper. libigl 2.5.1 computes the
+same points from the same moments, but other moments: its LDLᵀ reads only the lower triangle of I + λ D⁻¹ L, which is
+not symmetric, so that constants are not preserved; with that copied, its moments agree to rounding.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["delta_mush_moments", "direct_delta_mush"]
 
-_NEGLIGIBLE = 1e-9  # smoothed weight of a joint below which a vertex does not know of it
+_NEGLIGIBLE = 1e-9  # entries of Ω_ij below which the joint is left out at the vertex
 
 
 def delta_mush_moments(
@@ -34,7 +34,7 @@ def delta_mush_moments(
     translation_step: float = 1.0,
     blend: float = 0.8,
 ) -> csr_array:
-    """The matrices Ω of every vertex and joint, 4 × 4 blocks of a sparse (4 V, 4 J).
+    """The matrices Ω of every vertex and joint, as 4 × 4 blocks of a sparse matrix, shape (4 V, 4 J).
 
     Ω_ij = (1 − α) Σ_k A_ik w_kj u_k u_kᵀ + α w'_ij p_i p_iᵀ with u = (S, 1), A = (I + λ D⁻¹ L)^−n, w' weights smoothed
     by κ in place of λ, and p_i the smoothed position; L is the cotangent Laplacian, D its diagonal.
@@ -43,8 +43,8 @@ def delta_mush_moments(
         rest: Rest vertices [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
         skin: Painted weights.
-        joints: How many joints there are, J.
-        iterations: Steps of smoothing, n.
+        joints: Number of joints, J.
+        iterations: Smoothing steps, n.
         rotation_step: λ.
         translation_step: κ.
         blend: α.
@@ -110,7 +110,7 @@ def direct_delta_mush(
 def _cotangent_laplacian(
     points: NDArray[np.float64], faces: NDArray[np.int32]
 ) -> tuple[csr_array, NDArray[np.float64]]:
-    """Positive semi-definite, (V, V), and its diagonal; 1 where a vertex belongs to no face."""
+    """Cotangent Laplacian, positive semi-definite, shape (V, V), and its diagonal, with 1 at vertices of no face."""
     rows, columns, values = [], [], []
     for k in range(3):
         a, b, c = (faces[:, (k + n) % 3] for n in range(3))

@@ -1,4 +1,4 @@
-"""Warp devices, and arrays on them."""
+"""Warp devices by name, and arrays and parameters on them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["array_on", "checked_device", "parameters_on"]
 
 
 def checked_device(name: str) -> wp.Device:
-    """The Warp device of that name, or an InputError that lists those there are."""
+    """The Warp device of that name; InputError with the available ones where there is none."""
     import warp as wp
 
     wp.init()
@@ -24,11 +24,11 @@ def checked_device(name: str) -> wp.Device:
         return wp.get_device(name)
     except (ValueError, RuntimeError) as error:  # RuntimeError: no driver for any CUDA device
         known = ", ".join(str(d) for d in wp.get_devices())
-        raise InputError(f"device '{name}' is not available; there are: {known}") from error
+        raise InputError(f"device '{name}' is not available; want one of: {known}") from error
 
 
 def parameters_on(device: wp.Device, parameters: Parameters) -> Any:
-    """``warpjld_kernels.paper.Parameters`` on a device."""
+    """The parameters as the kernels' struct ``warpjld_kernels.paper.Parameters`` on a device."""
     from warpjld_kernels import paper
 
     out = paper.Parameters()
@@ -38,7 +38,7 @@ def parameters_on(device: wp.Device, parameters: Parameters) -> Any:
 
 
 def array_on(device: Any, values: np.ndarray, kind: Any, *, requires_grad: bool = False) -> Any:
-    """An array of float32 or int32 on a device."""
+    """A Warp array of float32 or int32 on a device, converted to that type."""
     import warp as wp
 
     plain = np.array(values, dtype=np.int32 if kind is wp.int32 else np.float32, order="C")

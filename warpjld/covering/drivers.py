@@ -1,4 +1,4 @@
-"""What a pose gives the operators: joint positions, rotations, and the scalars that drive inflation."""
+"""Pose inputs of the operators: joint positions, rotations, and the scalars that drive inflation."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Drivers:
     Attributes:
         positions: Joint positions [m], shape (F, J, 3).
         halfway: Rotation halfway between the two bones that meet at a joint, x y z w, shape (F, J, 4) (C22).
-        rotations: Rotation of the bone that begins at a joint, shape (F, J, 4).
+        rotations: Rotation of the bone that begins at a joint, x y z w, shape (F, J, 4).
         flexion_ratio: FR of every joint, 0 … 1, shape (F, J) (R59, C18).
-        closing: log λ of every palm pair at its stations, 0 where the neighbours move apart, shape (F, N, stations).
+        closing: log λ of every palm pair at its stations, 0 where the neighbours move apart, shape (F, N, STATIONS).
     """
 
     positions: NDArray[np.float64]
@@ -44,7 +44,7 @@ class Drivers:
 
 
 def drive(skeleton: Skeleton, anchors: Anchors, poses: Poses) -> Drivers:
-    """Everything the operators take from poses."""
+    """Compute all pose inputs of the operators."""
     return Drivers(
         poses.positions,
         halfway_rotations(skeleton, poses.rotations),
@@ -63,7 +63,7 @@ def halfway_rotations(skeleton: Skeleton, rotations: NDArray[np.float64]) -> NDA
 def flexion_ratio(skeleton: Skeleton, flexion: NDArray[np.float64]) -> NDArray[np.float64]:
     """FR = vertical flexion / maximal flexion, clamped to 0 … 1, shape (F, J) (A §6.1, C18).
 
-    Zero at roots: an angle lies between two segments (R1), and a root turns all there is.
+    Zero at roots: an angle lies between two segments (R1), and a root has no segment before it.
     """
     largest = skeleton.limits[:, FLEXION, 1]
     moves = (largest > 1e-6) & (skeleton.parents >= 0)
@@ -71,7 +71,7 @@ def flexion_ratio(skeleton: Skeleton, flexion: NDArray[np.float64]) -> NDArray[n
 
 
 def initial_ratio(skeleton: Skeleton) -> NDArray[np.float64]:
-    """FR of every joint at rest, shape (J,): 0 where it is straight there (R25)."""
+    """FR of every joint at rest, shape (J,): 0 where the joint is straight at rest (R25)."""
     if skeleton.initial_turns is None:
         return np.zeros(len(skeleton))
     still = np.tile([0.0, 0.0, 0.0, 1.0], (len(skeleton), 1))

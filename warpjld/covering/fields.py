@@ -1,10 +1,10 @@
-"""Coefficients of the covering formula as fields on the surface: one number for each vertex and each pose input.
+"""Coefficients of the covering formula as fields on the surface: one number per vertex and pose input.
 
     S' = Σ c_j J_j' + rot(normalise(Σ w_k q_k), (1 + Σ (g_i + s_i) f_i) d + Σ m_s f_s h_s),  d = S − Σ c_j J_j
 
-with positions J', rotations q and flexion ratios f of a pose, and the height h_s of a vertex over a segment. Being
-fields they can be smoothed and thinned out before they are used, whatever they were made from; d is taken from what is
-left of c, so that the rest pose stays exact.
+with positions J', rotations q and flexion ratios f of a pose, and the height vector h_s of a vertex over a segment. As
+fields they can be diffused and thinned out before use; d is computed from the resulting c, so that the rest pose stays
+exact.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ else:
 __all__ = ["Fields", "OperatorKernel", "joint_of_column", "operator_fields"]
 
 _PIVOT = 0.15
-"""Share of a segment at either end whose vertices turn about the joint itself. Sections then keep their distance from
-the joint while they turn, and with it their volume; joined by straight lines from joint to joint, middles of sections
-cut the corner. Larger shares gain little more, and knuckles get sharper."""
+"""Share of a segment at either end whose vertices turn about the joint itself, so that cross-sections keep their
+distance from the joint, and with it their volume; with centres interpolated all along the segment, cross-sections cut
+the corner. Larger shares gain little more, and knuckles get sharper."""
 _KINDS = ("positions", "turns", "roundings", "swellings", "palm", "muscles")
 
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """Sparse coefficients of V vertices. The joints' amplitudes are not in them.
+    """Sparse coefficients of V vertices, without the amplitudes of the parameters.
 
     Attributes:
-        positions: Of the joints' positions, shape (V, J); rows sum to one.
+        positions: Coefficients of the joints' positions, shape (V, J); rows sum to one.
         turns: Of the J halfway rotations, then of the J bones' rotations, shape (V, 2 J); rows sum to one.
-        roundings: Of the joints' flexion ratios, shape (V, J).
-        swellings: Of the same, over the whole of a joint's segments: where flesh goes that bending pushes away.
+        roundings: Of the joints' flexion ratios, within the joints' proximities, shape (V, J).
+        swellings: Of the joints' flexion ratios, over the whole of a joint's segments, shape (V, J): the flesh that
+            bending displaces.
         palm: Of the palm pairs' thickening at their stations, shape (V, N · STATIONS).
         muscles: Of the segments' muscles, shape (V, S).
     """
@@ -56,37 +57,37 @@ class Fields:
     muscles: sp.csr_array
 
     def stacked(self) -> sp.csr_array:
-        """All fields side by side, in the order of the attributes."""
+        """All fields side by side, in the order of the attributes, shape (V, columns)."""
         return sp.csr_array(sp.hstack([getattr(self, kind) for kind in _KINDS], format="csr"))
 
     def like(self, stacked: sp.csr_array | NDArray[np.float64]) -> Fields:
-        """Other fields, laid out as these are, from all of them side by side."""
+        """Fields of the same widths as these, from a stacked matrix (see :meth:`stacked`)."""
         ends = np.cumsum([getattr(self, kind).shape[1] for kind in _KINDS])
         columns = sp.csc_array(stacked)
         return Fields(*(columns[:, a:b].tocsr() for a, b in zip([0, *ends[:-1]], ends, strict=True)))
 
     def offsets(self, rest: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[np.float64]:
-        """d of every vertex [m], shape (V, 3), from rest positions of the vertices and of the joints."""
+        """d of every vertex [m], shape (V, 3), from the rest positions of vertices (V, 3) and joints (J, 3)."""
         return np.asarray(rest - self.positions @ joints)
 
 
 def joint_of_column(anchors: Anchors, joints: int) -> NDArray[np.int64]:
-    """The joint that each column of all fields side by side belongs to: fields of one joint lie in one place."""
+    """The joint around which each column of the stacked fields lies, shape (columns,)."""
     own = np.arange(joints)
     pairs = anchors.ends[anchors.pairs[:, 0], 0] if len(anchors.pairs) else np.zeros(0, dtype=np.int64)
     return np.concatenate([own, own, own, own, own, np.repeat(pairs, STATIONS), anchors.ends[:, 0]]).astype(np.int64)
 
 
 def operator_fields(anchors: Anchors, parameters: Parameters) -> Fields:
-    """The fields as the operators give them, from the vertices' places on their segments."""
+    """Fields of the operators before diffusion, from the vertices' coordinates on their segments."""
     return OperatorKernel(anchors, parameters).fields
 
 
 class OperatorKernel:
-    """Fields of the operators, and what derivatives by them mean for the parameters.
+    """Fields of the operators, and their vector-Jacobian product with respect to the parameters.
 
     Attributes:
-        fields: As :func:`operator_fields` gives them.
+        fields: Result of :func:`operator_fields`.
     """
 
     def __init__(self, anchors: Anchors, parameters: Parameters, *, requires_grad: bool = False) -> None:
@@ -117,19 +118,20 @@ class OperatorKernel:
         self._layout(len(parameters.inflation))
 
     def _layout(self, joints: int) -> None:
+        """Assemble ``fields`` from the kernel's values at each vertex and segment."""
         anchors = self._anchors
         turn, rounding, muscle = (a.numpy() for a in self._out)
         proximal, distal = anchors.ends[anchors.segment, 0], anchors.ends[anchors.segment, 1]
-        hard = (anchors.rigid >= 0).astype(np.float64)[:, None]
+        is_rigid = (anchors.rigid >= 0).astype(np.float64)[:, None]
         follows = np.maximum(anchors.rigid, 0)[:, None]
         between = np.clip((anchors.ratio - _PIVOT) / (1.0 - 2.0 * _PIVOT), 0.0, 1.0)
         positions = [
             (proximal, anchors.weight * (1.0 - between)),
             (distal, anchors.weight * between),
-            (follows, hard),
+            (follows, is_rigid),
         ]
         self._turn_columns = (proximal, joints + proximal, distal)
-        turns = [*((c, turn[..., k]) for k, c in enumerate(self._turn_columns)), (joints + follows, hard)]
+        turns = [*((c, turn[..., k]) for k, c in enumerate(self._turn_columns)), (joints + follows, is_rigid)]
         self._rounding_columns = (proximal, distal)
         roundings = [(c, rounding[..., k]) for k, c in enumerate(self._rounding_columns)]
         low = np.minimum(anchors.station.astype(int), STATIONS - 2)
@@ -149,8 +151,8 @@ class OperatorKernel:
     def backward(
         self, turns: NDArray[np.float64], roundings: NDArray[np.float64], muscles: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Derivatives by proximity (J, 2), peak (J,) and exponents (J, 2) of a number whose derivatives by the fields
-        of turns (V, 2 J), roundings (V, J) and muscles (V, S) are given. Wants ``requires_grad``."""
+        """Derivatives of a number by proximity (J, 2), peak (J,) and exponents (J, 2), from its derivatives by the
+        fields of turns (V, 2 J), roundings (V, J) and muscles (V, S). Needs ``requires_grad``."""
         import warp as wp
 
         rows = np.arange(len(self._anchors))[:, None]
@@ -170,8 +172,11 @@ class OperatorKernel:
 
 
 def _swellings(anchors: Anchors) -> list[tuple[NDArray, NDArray]]:
-    """From 1 at a joint to 0 at the other end of its segment, without an edge at either. Outside and at the sides only:
-    inside a bend more flesh would be in the way. A skull does not swell."""
+    """Columns and values of the swelling field: 1 at a joint, falling smoothly to 0 at the other end of its segment.
+
+    Only on the external side and the flanks, since more flesh on the inside of a bend would collide; stiff segments (a
+    skull) do not swell.
+    """
     t = np.clip(anchors.ratio, 0.0, 1.0)
     amount = anchors.weight * anchors.side * ~anchors.stiff[anchors.segment]
     ends = (anchors.ends[anchors.segment, k] for k in (0, 1))
@@ -179,6 +184,7 @@ def _swellings(anchors: Anchors) -> list[tuple[NDArray, NDArray]]:
 
 
 def _sparse(entries: list[tuple[NDArray, NDArray]], rows: int, width: int) -> sp.csr_array:
+    """Sparse (rows, width) from columns (rows, k) and values (rows, k); entries of the same place are summed."""
     if not entries or not width:
         return sp.csr_array((rows, width))
     row = np.concatenate([np.repeat(np.arange(rows), c.shape[1]) for c, _ in entries])

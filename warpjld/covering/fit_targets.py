@@ -1,8 +1,8 @@
-"""Parameters fitted to shapes that a rig shall have in given poses: scans, or corrective shapes of another rig.
+"""Fit of the parameters to target shapes in given poses: scans, or corrective shapes of another rig.
 
-Positions are linear in the amplitudes, so these are the solution of one least squares problem within bounds. What
-shapes the fields (proximities, peaks, exponents, the palm's exponents) is then followed by its gradients, through
-diffusion, and the amplitudes are solved for again.
+Positions are linear in the amplitudes, so these solve one bounded linear least squares problem. The parameters that
+shape the fields (proximities, peaks, exponents, the palm's exponents) are then optimised by L-BFGS-B with gradients
+through the diffusion, and the amplitudes are solved for again.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["TargetFit", "fit_targets"]
 
-_HIGHEST = 3.0  # amplitude: somebody modelled these shapes
-_PULL = 1e-6  # to the start, of what the average amplitude moves: keeps what the shapes do not determine
-_ROUNDS = 4  # of fields and amplitudes in turn
-_GAIN = 0.02  # of the root of the mean square, for which fields are worth changing
-_BOUNDS = {"proximity": (0.05, 0.5), "peak": (0.1, 0.9), "exponents": (0.2, 3.0), "palm": (0.0, 0.5)}  # of the search
+_HIGHEST = 3.0  # upper bound of amplitudes, wide since the target shapes were modelled or scanned
+_PULL = 1e-6  # Tikhonov weight, relative to the mean diagonal: keeps amplitudes that the shapes do not determine
+_ROUNDS = 4  # rounds of fields and amplitudes in turn
+_GAIN = 0.02  # relative decrease of the RMS distance below which a round is discarded
+_BOUNDS = {"proximity": (0.05, 0.5), "peak": (0.1, 0.9), "exponents": (0.2, 3.0), "palm": (0.0, 0.5)}  # search bounds
 
 
 @dataclass(frozen=True, eq=False)
 class TargetFit:
-    """What :func:`fit_targets` found.
+    """Result of :func:`fit_targets`.
 
     Attributes:
-        parameters: The best found.
-        before: Distances of the start from the targets [m]: root of the mean square in each pose, shape (F,), and
-        after: with ``parameters``.
+        parameters: The best parameters found.
+        before: RMS distance from the targets in each pose at the start [m], shape (F,).
+        after: The same with ``parameters``.
         farthest: Largest distance [m] before and after.
         seconds: Time taken.
     """
@@ -50,7 +50,7 @@ class TargetFit:
 
     @property
     def rms(self) -> tuple[float, float]:
-        """Over all poses [m], before and after."""
+        """RMS distance over all poses [m], before and after."""
         before, after = (float(np.sqrt((part**2).mean())) for part in (self.before, self.after))
         return before, after
 
@@ -66,21 +66,21 @@ def fit_targets(
     """Fit the parameters of a covering to target shapes.
 
     Args:
-        covering: A bound surface; its parameters are the start, and stay where shapes do not determine them.
+        covering: A bound surface; its parameters are the start, and stay where the targets do not determine them.
         poses: F poses of its skeleton.
-        targets: Where its vertices shall be in them [m], shape (F, V, 3).
-        iterations: Most steps of the minimiser over what shapes the fields.
-        progress: Called with what is being done, how much of it is done, and how much there is.
+        targets: Target positions of its vertices in them [m], shape (F, V, 3).
+        iterations: Limit of L-BFGS-B iterations in each round.
+        progress: Called with the name of the phase, its steps done, and the number of its steps.
 
     Raises:
-        InputError: Targets of another shape, farther from the surface than it is large, or fewer than one iteration.
+        InputError: Targets of another shape, at a distance larger than the surface itself, or fewer than one iteration.
     """
     if iterations < 1:
         raise InputError(f"iterations: want at least 1, got {iterations}")
     shape = (len(poses), len(covering.surface.vertices), 3)
     if targets.shape != shape or not len(poses):
         raise InputError(f"targets: want shape {shape}, got {targets.shape}")
-    tell = progress or (lambda what, done, total: None)
+    report = progress or (lambda what, done, total: None)
     started = time.perf_counter()
     before, far = _distances(covering, poses, targets)
     if before.max() > covering.surface.size:
@@ -88,10 +88,10 @@ def fit_targets(
             f"targets: {1e3 * before.max():.4g} mm from a surface of {1e3 * covering.surface.size:.4g} mm: "
             "want metres, in the frame of the rig"
         )
-    best = _solved(covering, poses, targets, tell)
+    best = _solved(covering, poses, targets, report)
     after, farthest = _distances(best, poses, targets)
     for _ in range(_ROUNDS):
-        other = _solved(_reshaped(best, poses, targets, iterations, tell), poses, targets, tell)
+        other = _solved(_reshaped(best, poses, targets, iterations, report), poses, targets, report)
         reshaped, its_farthest = _distances(other, poses, targets)
         if np.sqrt((reshaped**2).sum()) >= (1.0 - _GAIN) * np.sqrt((after**2).sum()):
             break
@@ -102,7 +102,7 @@ def fit_targets(
 
 
 def _distances(covering: Covering, poses: Poses, targets: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Root of the mean squared distance in every pose, shape (F,), and the largest distance [m]."""
+    """RMS distance from the targets in every pose, shape (F,), and the largest distance of all [m]."""
     rms, largest = np.zeros(len(poses)), 0.0
     for start, block in covering.blocks(poses):
         squared = ((block - targets[start : start + len(block)]) ** 2).sum(axis=2)
@@ -112,9 +112,9 @@ def _distances(covering: Covering, poses: Poses, targets: NDArray[np.float64]) -
 
 
 def _solved(
-    covering: Covering, poses: Poses, targets: NDArray[np.float64], tell: Callable[[str, int, int], None]
+    covering: Covering, poses: Poses, targets: NDArray[np.float64], report: Callable[[str, int, int], None]
 ) -> Covering:
-    """The covering with the amplitudes that bring it nearest to the targets."""
+    """The covering with the amplitudes of the least squared distance from the targets."""
     from scipy.optimize import lsq_linear
 
     deformation = LinearDeformation(covering, poses)
@@ -124,7 +124,7 @@ def _solved(
         missing = (targets[frame.number, frame.moved] - frame.points[frame.moved]).ravel()
         square += (frame.directions.T @ frame.directions).toarray()
         slope += frame.directions.T @ missing
-        tell("amplitudes", frame.number + 1, len(poses))
+        report("amplitudes", frame.number + 1, len(poses))
     moved = np.flatnonzero(np.diag(square) > 1e-12 * np.diag(square).max(initial=0.0))
     if not moved.size:
         return covering
@@ -143,9 +143,9 @@ def _reshaped(
     poses: Poses,
     targets: NDArray[np.float64],
     iterations: int,
-    tell: Callable[[str, int, int], None],
+    report: Callable[[str, int, int], None],
 ) -> Covering:
-    """The covering with fields nearer to what the targets want, amplitudes as they are."""
+    """The covering with field parameters that lessen the squared distance from the targets, at given amplitudes."""
     from scipy.optimize import minimize
 
     first = covering.parameters
@@ -170,9 +170,9 @@ def _reshaped(
     def step(_: NDArray[np.float64]) -> None:
         nonlocal done
         done = min(done + 1, iterations)
-        tell("fields", done, iterations)
+        report("fields", done, iterations)
 
-    if scale <= (1e-7 * covering.surface.size) ** 2 * targets[..., 0].size:  # as near as single precision comes
+    if scale <= (1e-7 * covering.surface.size) ** 2 * targets[..., 0].size:  # exact to single precision
         return covering
     found = minimize(
         objective, x, jac=True, method="L-BFGS-B", bounds=bounds, callback=step, options={"maxiter": iterations}

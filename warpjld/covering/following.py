@@ -1,4 +1,4 @@
-"""Fields of shells that lie on the skin, read from the skin: nails, eyes and clothes go with what is under them."""
+"""Transfer of coefficient fields from the skin to shells that lie on it: nails, eyes and clothes follow the skin."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ __all__ = ["Following", "following"]
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """What every vertex reads its coefficients from; linear, so gradients run back through the transposes.
+    """Linear map from fields of the skin to those of the whole surface.
 
     Attributes:
-        follow: Sparse (V, V), rows summing to one: the identity's but on shells that lie on others.
-        bending: ``follow`` without the rows of small shells, which move rigidly: a nail neither rounds at a joint nor
-            swells with a muscle.
+        follow: Interpolation weights, sparse (V, V), rows summing to one; rows of the identity except on shells that
+            lie on others.
+        bending: ``follow`` with zero rows on small shells, which move rigidly: a nail is neither rounded at a joint nor
+            swollen by a muscle.
     """
 
     follow: sp.csr_array
     bending: sp.csr_array
 
     def of(self, fields: Fields) -> Fields:
-        """Fields of the whole surface, from those of the skin."""
+        """Fields of the whole surface, from the diffused ones, of which only the skin's are used."""
         return Fields(
             self.follow @ fields.positions,
             self.follow @ fields.turns,
@@ -44,7 +45,7 @@ class Following:
         )
 
     def adjoint(self, slopes: Fields) -> Fields:
-        """Derivatives by the skin's fields of a number whose derivatives by those of the whole surface are given."""
+        """Derivatives of a number by the skin's fields, from those by the fields of the whole surface (transpose)."""
         return Fields(
             sp.csr_array(self.follow.T @ slopes.positions),
             sp.csr_array(self.follow.T @ slopes.turns),
@@ -58,7 +59,7 @@ class Following:
 def following(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], lines: NDArray[np.float64], rigid: NDArray[np.int32]
 ) -> Following | None:
-    """What shells of a surface follow; None where its flesh is a single shell. Arguments as of ``shells``."""
+    """Map of fields onto the shells of a surface; None where its flesh is one shell. Arguments as of ``shells``."""
     from warpjld.covering.shells import shell_numbers, shells
 
     used = np.zeros(len(rigid), dtype=bool)

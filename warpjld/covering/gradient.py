@@ -1,4 +1,4 @@
-"""Derivatives of the deformation with respect to the animator's parameters and to what the pose gives it."""
+"""Derivatives of the deformation with respect to the animator's parameters and the pose inputs, in reverse mode."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ __all__ = ["Differentiable", "Gradients"]
 
 @dataclass(frozen=True, eq=False)
 class Gradients:
-    """Derivatives of one number with respect to every input, each shaped as the input is.
+    """Derivatives of one number with respect to every input, each of the input's shape.
 
     Attributes:
         parameters: With respect to the parameters of the joints.
-        pose: With respect to the inputs of the operators, frame by frame. Positions, rotations and halfway rotations
-            count as independent of one another; quaternion entries, as four free numbers.
+        pose: With respect to the pose inputs of the operators, frame by frame. Positions, rotations and halfway
+            rotations count as independent of one another, and the four entries of a quaternion too.
     """
 
     parameters: Parameters
@@ -40,18 +40,19 @@ class Gradients:
 class Differentiable:
     """The covering formula over fixed poses, with its vector-Jacobian product.
 
-    The places of the vertices and the swelling are those of ``covering``: where parameters move places between palm
-    segments (proximities, A Fig. 7), or change what swells, that is neither followed nor differentiated. Take
-    ``covering.with_parameters`` for it.
+    The vertices' weights between palm segments and the swelling are those of ``covering``: their dependence on the
+    parameters (proximities, A Fig. 7) is neither evaluated nor differentiated. ``covering.with_parameters`` updates
+    them.
 
     Args:
         covering: A bound surface.
         poses: F poses of its skeleton.
-        vertices: Vertices to follow; all V by default.
+        vertices: Indices of the vertices to deform, n; all V by default.
         device: Warp device.
 
     Raises:
-        InputError: Poses that do not fit or are not finite, a vertex that does not exist, an unknown device.
+        InputError: Poses of another skeleton or not finite, a vertex index out of range, an unknown device, or a
+            covering by the paper's operators.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -98,7 +99,7 @@ class Differentiable:
             spread = covering.diffused(shapes.fields)
             thin = thinned(spread)
         rows = rows_of(thin, covering.skeleton, covering.anchors, chosen, covering.swelling)
-        # a tape's backward reads arrays as they are then: inputs and outputs are made afresh at every step
+        # the tape's backward pass reads the arrays' contents at that time, so inputs and outputs are allocated anew
         values = rows_on(self._device, rows, requires_grad=True)
         pose = pose_on(self._device, covering.anchors, chosen, self._drivers, requires_grad=True)
         points = wp.empty(self._shape, dtype=wp.vec3, device=self._device, requires_grad=True)
@@ -142,7 +143,7 @@ class Differentiable:
         )
 
     def _by_scalars(self, step: _Step, slope: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Derivatives by flexion ratios and by log λ, from those by the scalar inputs."""
+        """Derivatives by flexion ratios (F, J) and by log λ (F, N, STATIONS), from those by the scalar inputs."""
         anchors, joints = self._covering.anchors, len(self._covering.skeleton)
         muscles = slope[:, step.rows.scales.shape[1] :]
         ratio = slope[:, :joints].copy()
@@ -156,6 +157,7 @@ class Differentiable:
         return ratio, closing
 
     def _by_parameters(self, step: _Step, scalars: NDArray[np.float64]) -> Parameters:
+        """Derivatives by all parameters, from those of the tape and those by the scalar inputs."""
         covering, anchors, chosen = self._covering, self._covering.anchors, step.parameters
         rows, joints, vertices = step.rows, len(self._covering.skeleton), len(self._covering.anchors)
         scale_slope = _entries(rows.scales, step.values.scale)
@@ -163,7 +165,7 @@ class Differentiable:
         by_vector = unit.sums(_gradient(step.values.muscle), len(rows.muscles.data))
         muscle_slope = (by_vector * rows.heights).sum(axis=1)  # by what scales the height: amplitude × field
         initial = initial_ratio(covering.skeleton)
-        if initial.any():  # offsets are those of straight joints, and follow from the amplitudes
+        if initial.any():  # the offsets of straight joints depend on the amplitudes where joints are bent at rest
             ratio = np.concatenate([initial, np.zeros(rows.scales.shape[1] - joints)])
             by_offset = _gradient(step.values.offset) / (1.0 + rows.scales @ ratio)[:, None]
             vertex = np.repeat(np.arange(vertices), np.diff(rows.scales.indptr))
@@ -207,7 +209,7 @@ class Differentiable:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A forward pass, for its backward one."""
+    """Arrays of a forward pass that its backward pass needs."""
 
     tape: Any
     values: Any
@@ -221,7 +223,7 @@ class _Step:
 
 
 def _entries(matrix: sp.csr_array, padded: Any) -> NDArray[np.float64]:
-    """Derivatives by the entries of a matrix."""
+    """Derivatives by the stored entries of a matrix, from those by its padded array on the device."""
     return Padded.of(matrix).sums(_gradient(padded), len(matrix.data))
 
 

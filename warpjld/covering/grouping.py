@@ -1,8 +1,8 @@
-"""Which vertices go into one run: those whose columns of the palette overlap, so that tiles do little that is wasted.
+"""Clustering of vertices into runs of similar sparsity pattern, so that tiles spend little work on zeros.
 
-A tile of vertices pays for every column that one of them uses. Vertices with the same columns are one *kind*; kinds are
-first parted from the top, always by the column that saves most, into parts about as large as a tile, then parts are
-joined from the smallest up wherever that costs least.
+A tile of vertices is computed with every column that any of them uses. Vertices with the same columns are one *kind*.
+Kinds are divided top-down, always by the column that saves most, into parts of about the size of a tile; then parts are
+merged bottom-up, the smallest first, each where it adds least.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ else:
 __all__ = ["FIXED", "group", "work"]
 
 FIXED = 60
-"""Multiply-adds that a vertex spends whatever its columns, mostly on rotating."""
+"""Multiply-adds per vertex that do not depend on its columns, mostly for the rotation."""
 
-_PARTS = 600  # that the surface falls into at least before parts are joined, where it has vertices enough
-_SPARSE = 512  # kinds above which products of mostly zeros pay
+_PARTS = 600  # smallest number of parts before merging, where there are vertices enough
+_SPARSE = 512  # number of kinds above which sparse products are faster than dense ones
 
 
 def group(
     used: sp.csr_array, price: NDArray[np.float64], lanes: int
 ) -> tuple[list[NDArray[np.int64]], list[NDArray[np.int64]]]:
-    """Vertices of every run, ascending, and its columns, ascending. A run has at least ``lanes`` vertices.
+    """Vertices and columns of every run, both ascending. A run has at least ``lanes`` vertices.
 
     Args:
-        used: What a vertex reads, its stored entries whatever their values, shape (V, columns).
-        price: Multiply-adds a vertex spends on a column, shape (columns,).
-        lanes: Vertices that are computed together.
+        used: Sparsity pattern, shape (V, columns): a stored entry, of whatever value, is a column the vertex uses.
+        price: Multiply-adds of a column per vertex, shape (columns,).
+        lanes: Vertices of a tile, which are computed together.
 
-    On a surface smaller than one tile the last vertex stands in for the missing ones.
+    On a surface smaller than one tile the last vertex is repeated.
     """
     kinds, kind, sizes = _kinds(used)
     present = np.flatnonzero(np.diff(kinds.tocsc().indptr))
     kinds = kinds[:, present].tocsr()
     prices = price[present].astype(np.float32)
-    with one_blas_thread():  # thousands of small products
-        part = _parted(kinds, sizes.astype(np.float32), prices, max(lanes, int(sizes.sum()) // _PARTS))
-        run = _joined(*_columns_of(kinds, sizes, part), prices, lanes)[part]
+    with one_blas_thread():  # thousands of small products, which several threads only slow down
+        part = _divided(kinds, sizes.astype(np.float32), prices, max(lanes, int(sizes.sum()) // _PARTS))
+        run = _merged(*_columns_of(kinds, sizes, part), prices, lanes)[part]
     member = run[kind]
     members = np.split(np.argsort(member, kind="stable"), np.cumsum(np.bincount(member))[:-1])
     columns = [present[np.flatnonzero(row)] for row in _columns_of(kinds, sizes, run)[0]]
@@ -57,13 +57,14 @@ def group(
 
 
 def work(members: list[NDArray[np.int64]], columns: list[NDArray[np.int64]], price: NDArray, lanes: int) -> float:
-    """Multiply-adds of a frame, those of lanes computed twice included."""
+    """Multiply-adds per frame, including lanes that are computed twice."""
     pairs = zip(members, columns, strict=True)
     return float(sum(_tiles(len(m), lanes) * lanes * (FIXED + price[c].sum()) for m, c in pairs))
 
 
 def _kinds(used: sp.csr_array) -> tuple[sp.csr_array, NDArray[np.int64], NDArray[np.int64]]:
-    """Different rows of the pattern, shape (kinds, columns), the kind of every vertex, and the vertices of a kind."""
+    """Distinct rows of the pattern, shape (kinds, columns), the kind of every vertex, (V,), and the number of vertices
+    of every kind, (kinds,)."""
     signature = np.random.default_rng(0).integers(1, 2**62, used.shape[1])
     pattern = sp.csr_array((np.ones(used.nnz, dtype=np.int64), used.indices, used.indptr), shape=used.shape)
     _, first, kind = np.unique(pattern @ signature, return_index=True, return_inverse=True)
@@ -74,7 +75,7 @@ def _kinds(used: sp.csr_array) -> tuple[sp.csr_array, NDArray[np.int64], NDArray
 def _columns_of(
     kinds: sp.csr_array, sizes: NDArray[np.int64], part: NDArray[np.int64]
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Which columns every part uses, 0 or 1, shape (parts, columns), and its vertices."""
+    """Which columns every part uses, 0 or 1, shape (parts, columns), and its number of vertices, shape (parts,)."""
     count = int(part.max()) + 1
     entries = (np.ones(len(part), dtype=np.float32), (part, np.arange(len(part))))
     member = sp.csr_array(entries, shape=(count, len(part)))
@@ -82,36 +83,39 @@ def _columns_of(
     return used, np.bincount(part, weights=sizes, minlength=count).astype(np.int64)
 
 
-def _parted(
+def _divided(
     kinds: sp.csr_array, sizes: NDArray[np.float32], price: NDArray[np.float32], enough: int
 ) -> NDArray[np.int64]:
-    """Part of every kind. Parts split, by the column that saves most, until they have no more than ``enough``."""
+    """Part of every kind, shape (kinds,). Parts of more than ``enough`` vertices are divided by the column that saves
+    most."""
     part = np.zeros(kinds.shape[0], dtype=np.int64)
     count = 0
     waiting = [(np.arange(kinds.shape[0]), kinds, price)]
     while waiting:
-        rows, some, prices = waiting.pop()
-        column = _best_split(some, sizes[rows], prices) if len(rows) > 1 and sizes[rows].sum() > enough else None
+        rows, used, prices = waiting.pop()
+        column = _best_split(used, sizes[rows], prices) if len(rows) > 1 and sizes[rows].sum() > enough else None
         if column is None:
             part[rows] = count
             count += 1
             continue
-        inside = (some[:, [column]].toarray() if sp.issparse(some) else some[:, [column]])[:, 0] > 0
+        inside = (used[:, [column]].toarray() if sp.issparse(used) else used[:, [column]])[:, 0] > 0
         for chosen in (inside, ~inside):
-            mine = some[chosen]
-            if sp.issparse(mine):
-                held = np.bincount(mine.indices, minlength=mine.shape[1]) > 0
-                mine = mine[:, held] if mine.shape[0] > _SPARSE else mine.toarray()[:, held]
+            part_pattern = used[chosen]
+            if sp.issparse(part_pattern):
+                held = np.bincount(part_pattern.indices, minlength=part_pattern.shape[1]) > 0
+                part_pattern = (
+                    part_pattern[:, held] if part_pattern.shape[0] > _SPARSE else part_pattern.toarray()[:, held]
+                )
             else:
-                held = mine.any(axis=0)
-                mine = mine[:, held]
-            waiting.append((rows[chosen], mine, prices[held]))
+                held = part_pattern.any(axis=0)
+                part_pattern = part_pattern[:, held]
+            waiting.append((rows[chosen], part_pattern, prices[held]))
     return part
 
 
-def _best_split(some: NDArray | sp.csr_array, sizes: NDArray, price: NDArray) -> int | None:
-    """Column whose presence parts these kinds so that both halves together cost least; None where all are alike."""
-    together = some.T @ some
+def _best_split(used: NDArray | sp.csr_array, sizes: NDArray, price: NDArray) -> int | None:
+    """Column by whose use kinds are divided at the least total cost; None where all kinds use the same columns."""
+    together = used.T @ used
     if sp.issparse(together):
         together = together.toarray()
     here = np.diagonal(together)  # kinds that use a column
@@ -121,15 +125,15 @@ def _best_split(some: NDArray | sp.csr_array, sizes: NDArray, price: NDArray) ->
     both = together[mixed]
     with_it = (both > 0).astype(np.float32) @ price
     without = (both < here).astype(np.float32) @ price
-    n = (some.T @ sizes)[mixed].astype(np.float64)
+    n = (used.T @ sizes)[mixed].astype(np.float64)
     cost = n * (FIXED + with_it) + (sizes.sum() - n) * (FIXED + without)
     return int(mixed[cost.argmin()])
 
 
-def _joined(
+def _merged(
     used: NDArray[np.float32], sizes: NDArray[np.int64], price: NDArray[np.float32], lanes: int
 ) -> NDArray[np.int64]:
-    """Run of every part: the smallest joins the one with which it adds least, until none gains by joining."""
+    """Run of every part, shape (parts,): the smallest part is merged where it adds least, until no merge pays."""
     count = len(sizes)
     used, sizes = used.copy(), sizes.copy()
     cost = used @ price
@@ -164,4 +168,5 @@ def _joined(
 
 
 def _tiles(sizes: NDArray[np.int64] | int, lanes: int) -> NDArray[np.int64]:
+    """Number of tiles of ``lanes`` vertices, rounded up."""
     return -(-np.asarray(sizes) // lanes)

@@ -1,4 +1,4 @@
-"""Heat at rest on a triangulated surface: the equations, and a solver that ends whatever the mesh is like."""
+"""Laplacians of triangulated surfaces, and robust sparse solvers for stationary and implicit heat diffusion."""
 
 from __future__ import annotations
 
@@ -30,25 +30,24 @@ __all__ = [
     "uniform_laplacian",
 ]
 
-# vertices up to which a sparse factorisation is taken: with 60 right-hand sides it is far quicker than multigrid, and
-# beyond its memory counts (1.5 kB a vertex)
+# vertices up to which a sparse factorisation is used: with 60 right-hand sides it is far faster than multigrid; beyond,
+# its memory (1.5 kB a vertex) is too large
 _DIRECT_LIMIT = 1_500_000
-_THREAD = 100_000  # unknowns times right-hand sides that a thread must have to solve for
-_BITS = 16  # of each coordinate in a place on the curve
-_TOLERANCE = 1e-7  # residual of the iterative solvers, and
-_ACCEPTED = 1e-5  # of a solution that is taken, both relative to the right-hand side
-_MULTIGRID_STEPS = 200  # iterations at most
-_PLAIN_STEPS = 5_000  # iterations at most, where multigrid cannot be used
+_THREAD = 100_000  # smallest number of unknowns times right-hand sides worth a thread of its own
+_BITS = 16  # bits of each coordinate in a Morton code
+_TOLERANCE = 1e-7  # residual at which iterative solvers stop, relative to the right-hand side
+_ACCEPTED = 1e-5  # largest relative residual of an accepted solution
+_MULTIGRID_STEPS = 200  # iteration limit
+_PLAIN_STEPS = 5_000  # iteration limit of conjugate gradients without multigrid
 
 
 def cotangent_laplacian(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], thickness: NDArray[np.float64]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
-    """Positive semidefinite cotangent Laplacian and barycentric vertex areas.
+    """Positive semidefinite cotangent Laplacian, shape (V, V), and barycentric vertex areas, shape (V,).
 
-    Cotangents are kept within (0, 1e3): a weight of the wrong sign would let heat run uphill. Around saddle corners
-    heat is conducted better, so that weights have no spike there, as far as a share of the ``thickness`` of what they
-    are on, shape (V,).
+    Cotangents are clamped to 1e-3 … 1e3: negative weights would violate the maximum principle. The conductivity is
+    raised around saddle vertices, within a share of the ``thickness`` there, shape (V,) (``corners.py``).
     """
     conductivity = corner_conductivity(vertices, faces, thickness)
     return _cotangents(vertices, faces, lambda i, j: conductivity)
@@ -60,7 +59,7 @@ def conducting_laplacian(
     thickness: NDArray[np.float64],
     conductivity: NDArray[np.float64],
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
-    """The same where heat is conducted as well as each vertex says, shape (V,): an edge by the mean of its ends."""
+    """As :func:`cotangent_laplacian`, each edge's weight times the mean ``conductivity`` of its ends, shape (V,)."""
     corner = corner_conductivity(vertices, faces, thickness)
     return _cotangents(vertices, faces, lambda i, j: corner * (conductivity[i] + conductivity[j]) / 2.0)
 
@@ -68,6 +67,7 @@ def conducting_laplacian(
 def _cotangents(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: Callable[[NDArray, NDArray], NDArray]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """Cotangent Laplacian and vertex areas; ``conductivity(i, j)`` is that of the edges i to j of all triangles."""
     count = len(vertices)
     rows, columns, values = [], [], []
     area = np.zeros(count)
@@ -81,29 +81,30 @@ def _cotangents(
         values += [cotangent * conductivity(i, j)] * 2
         np.add.at(area, apex, twice / 6.0)
     positive = area[area > 0.0]
-    # vertices no face uses, and those among faces without area, still belong somewhere
+    # vertices without faces, or with degenerate faces only, need a positive area too
     area = np.maximum(area, 1e-6 * positive.mean()) if positive.size else np.full(count, 1.0 / count)
     return _laplacian(np.concatenate(rows), np.concatenate(columns), np.concatenate(values), count), area
 
 
 def uniform_laplacian(faces: NDArray[np.int32], count: int) -> sp.csr_array:
-    """Every edge conducts alike: what is left where lengths and angles say nothing."""
+    """Graph Laplacian with equal edge weights, shape (V, V), for meshes too degenerate for cotangents."""
     rows = np.concatenate([faces[:, k] for k in (0, 1, 2, 1, 2, 0)])
     columns = np.concatenate([faces[:, k] for k in (1, 2, 0, 0, 1, 2)])
     return _laplacian(rows, columns, np.full(len(rows), 0.5), count)
 
 
 def _laplacian(rows: NDArray, columns: NDArray, conducted: NDArray[np.float64], count: int) -> sp.csr_array:
+    """Laplacian with these off-diagonal weights; entries of the same place are summed."""
     between = rows != columns
     off = sp.coo_array((conducted[between], (rows[between], columns[between])), shape=(count, count)).tocsr()
     return sp.diags_array(np.asarray(off.sum(axis=1)).ravel()) - off
 
 
 def spatial_order(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Vertices along a Z-order curve through space (Morton, 1966), near ones near each other, shape (V,).
+    """Order of the vertices along a Z-order curve through space (Morton, 1966), shape (V,).
 
-    What makes a factorisation quick besides its own ordering by least degrees, which leaves ties to the order given: a
-    third of the time of a mesh of 160,000 vertices numbered by reverse Cuthill-McKee.
+    It speeds up factorisation, whose minimum-degree ordering breaks ties by the given order: a third of the time on a
+    mesh of 160,000 vertices numbered by reverse Cuthill-McKee.
     """
     low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
     cells = ((vertices - low) / (size or 1.0) * (2**_BITS - 1)).astype(np.int64)
@@ -117,18 +118,19 @@ def spatial_order(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
 def solve_diffusion(
     matrix: sp.sparray, right: NDArray[np.float64], order: NDArray[np.int64] | None = None
 ) -> NDArray[np.float64] | None:
-    """X of A X = B for a symmetric, diagonally dominant A with a positive diagonal, shape (V, n).
+    """Solve A X = B for a symmetric, diagonally dominant A with a positive diagonal.
 
-    Scaled to a diagonal of ones, so that tiny and huge triangles count alike. Small systems are factorised; large ones
-    are left to multigrid, and where that does not settle to conjugate gradients, both with a bounded number of steps.
+    The system is scaled to a unit diagonal, so that tiny and huge triangles have equal influence on residuals. Small
+    systems are factorised; large ones are solved by multigrid, and by conjugate gradients where that or the
+    factorisation fails, with bounded numbers of iterations.
 
     Args:
         matrix: A, shape (V, V).
         right: B, shape (V, n).
-        order: Rows near each other near each other, as :func:`spatial_order` gives them, which makes it quick.
+        order: Permutation that brings neighbouring rows together (:func:`spatial_order`), which makes it faster.
 
     Returns:
-        The solution, or None where none was found.
+        X, shape (V, n), or None where no solver reached the accepted residual.
     """
     if order is not None:
         back = np.empty_like(order)
@@ -141,13 +143,13 @@ def solve_diffusion(
     scale = 1.0 / np.sqrt(diagonal)
     scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsc()
     goal = scale[:, None] * right
-    ways = (_direct, _plain) if len(scale) <= _DIRECT_LIMIT else (_multigrid, _plain)
-    for way in ways:
-        # what a solver has to say of a broken mesh is no message for who gave it: the residual tells
+    solvers = (_direct, _plain) if len(scale) <= _DIRECT_LIMIT else (_multigrid, _plain)
+    for solver in solvers:
+        # the solvers' own warnings do not help users; success is judged by the residual
         with warnings.catch_warnings(), np.errstate(all="ignore"), one_blas_thread():
             warnings.simplefilter("ignore")
             try:
-                found = way(scaled, goal, scale)
+                found = solver(scaled, goal, scale)
             except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, ValueError):
                 continue
             residual = np.linalg.norm(scaled @ found - goal, axis=0)
@@ -157,10 +159,10 @@ def solve_diffusion(
 
 
 class DiffusionFactor:
-    """A symmetric, diagonally dominant matrix, factorised once for many right-hand sides.
+    """Factorisation of a symmetric, diagonally dominant matrix for many right-hand sides.
 
-    SuperLU factorises; its factors are solved with here, which takes a third of the time for many right-hand sides,
-    and several threads.
+    SuperLU factorises; triangular solves are done by a kernel, which takes a third of SuperLU's time for many
+    right-hand sides, and uses several threads.
 
     Raises:
         ArithmeticError: The diagonal does not dominate.
@@ -171,10 +173,10 @@ class DiffusionFactor:
         scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsc()
         with one_blas_thread():
             factors = _factorised(scaled)
-        # a dominant diagonal is its own pivot: U = D Lᵀ, and rows are ordered as columns are
+        # without pivoting U = D Lᵀ, and rows are permuted as columns are
         if not np.array_equal(factors.perm_r, factors.perm_c):
             raise ArithmeticError("matrix: its diagonal does not dominate")
-        self._place = factors.perm_c.astype(np.int64)  # of each unknown in the factor
+        self._place = factors.perm_c.astype(np.int64)  # row of each unknown in the factor
         lower, upper = factors.L, factors.U
         lower.sort_indices()
         upper.sort_indices()
@@ -186,7 +188,7 @@ class DiffusionFactor:
     def solve(
         self, right: NDArray[np.float64], *, weight: NDArray[np.float64] | None = None, times: int = 1
     ) -> NDArray[np.float64]:
-        """X of A X = B, shape (V, n); or (A⁻¹ W)^times B with a diagonal matrix W of weights, shape (V,)."""
+        """Solve A X = B, shape (V, n); or give (A⁻¹ W)^times B with a diagonal matrix W of weights, shape (V,)."""
         import warp as wp
         from warpjld_kernels.symmetric_solve import TOGETHER, solve_symmetric
 
@@ -214,8 +216,8 @@ class DiffusionFactor:
 
 
 @contextmanager
-def _drawn_alike() -> Iterator[None]:
-    """pyamg draws from NumPy's global generator: always the same, and the generator is left as it was."""
+def _fixed_random_state() -> Iterator[None]:
+    """Fix the seed of NumPy's global generator, which pyamg draws from, and restore its state afterwards."""
     state = np.random.get_state()  # noqa: NPY002
     np.random.seed(0)  # noqa: NPY002
     try:
@@ -231,21 +233,21 @@ def _direct(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.
 
 
 def _factorised(matrix: sp.csc_array) -> linalg.SuperLU:
-    """Of a matrix whose diagonal dominates: no row changes places."""
+    """LU factors of a diagonally dominant matrix, without row pivoting."""
     return linalg.splu(matrix, diag_pivot_thresh=0.0, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
 
 def _multigrid(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
     import pyamg
 
-    # constants, which diffusion leaves alone, are 1 / scale in the scaled unknowns
-    with _drawn_alike():
+    # near-nullspace candidate: constants, which are 1 / scale in the scaled unknowns
+    with _fixed_random_state():
         hierarchy = pyamg.smoothed_aggregation_solver(sp.csr_matrix(matrix), B=(1.0 / scale)[:, None])
     out = np.empty_like(right)
     for k, b in enumerate(right.T):
         out[:, k], info = hierarchy.solve(b, tol=_TOLERANCE, accel="cg", maxiter=_MULTIGRID_STEPS, return_info=True)
-        if info:  # one that does not settle is enough: the next way begins at once
-            raise ArithmeticError("multigrid did not settle")
+        if info:  # a single column that does not converge is enough to try the next solver
+            raise ArithmeticError("multigrid did not converge")
     return out
 
 

@@ -1,8 +1,8 @@
-"""Self-intersection of a surface: which faces cross, and whether different digits touch or one digit folds.
+"""Self-intersections of a surface: pairs of intersecting faces, and whether they belong to one part or to two.
 
-Two faces cross where an edge of one passes through the other from one side to the other. Faces that only touch, or
-that lie in one plane, do not cross: nothing passes through. Of two faces with one common corner only the edges
-opposite to it are asked, of two with a common edge nothing is: they meet there by construction.
+Two faces cross where an edge of one passes through the other from one side to the other. Faces that only touch, or are
+coplanar, do not cross. Of two faces with one common vertex only the edges opposite to it are tested; two with a common
+edge are not tested.
 """
 
 from __future__ import annotations
@@ -39,25 +39,25 @@ class Parts:
 
 @dataclass(frozen=True)
 class Crossings:
-    """Crossing pairs of faces of one frame, shape (N, 2), the smaller index first."""
+    """Pairs of intersecting faces of one frame, shape (N, 2), the smaller index first."""
 
     pairs: NDArray[np.int32]
 
     @property
     def faces(self) -> NDArray[np.int32]:
-        """Faces that cross any other."""
+        """Indices of the faces that cross any other, ascending."""
         return np.unique(self.pairs)
 
     def contact(self, parts: Parts) -> Crossings:
-        """Those between different digits or a digit and the palm: bodies that press on one another."""
+        """Pairs of faces of different parts, such as two digits, or a digit and the palm."""
         return Crossings(self.pairs[self._differ(parts)])
 
     def folds(self, parts: Parts) -> Crossings:
-        """Those within one part: the surface of one digit has passed through itself."""
+        """Pairs of faces of the same part, whose surface has passed through itself."""
         return Crossings(self.pairs[~self._differ(parts)])
 
     def summary(self, parts: Parts) -> dict[str, int]:
-        """Faces involved by pair of parts, e.g. {"left.index × left.palm": 12}."""
+        """Number of faces involved by pair of parts, e.g. {"left.index × left.palm": 12}."""
         label = np.sort(parts.of_face[self.pairs], axis=1)
         out: dict[str, int] = {}
         for a, b in np.unique(label, axis=0).tolist():
@@ -80,7 +80,7 @@ def crossing_faces(
     Args:
         vertices: Positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        wanted: Which pairs (N, 2) to look at, shape (N,); all if left out.
+        wanted: Filter of candidate pairs (N, 2), returns a mask (N,); by default all are tested.
     """
     points = np.asarray(vertices, dtype=np.float64)
     points = points - points.mean(axis=0)
@@ -92,7 +92,8 @@ def crossing_faces(
 
 
 def surface_parts(covering: Covering) -> Parts:
-    """Parts from the domains: the digit whose operators hold most of a face; metacarpals and carpus are the palm."""
+    """Part of every face by the largest sum of its operators' weights: digits, limbs, and the palm (metacarpals and
+    carpus together)."""
     names: list[str] = []
     part_of_fan = []
     for fan in covering.fans:
@@ -114,7 +115,7 @@ def surface_parts(covering: Covering) -> Parts:
 
 
 def _overlapping(points: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Pairs of faces that share one corner at most and whose boxes overlap, shape (N, 2)."""
+    """Pairs of faces with at most one common vertex whose bounding boxes overlap, shape (N, 2)."""
     import warp as wp
     from warpjld_kernels.overlaps import overlapping_boxes
 
@@ -139,11 +140,12 @@ def _overlapping(points: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArr
 
 
 def _cross(points: NDArray[np.float64], faces: NDArray[np.int32], pairs: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Which pairs of faces (N, 2) cross, shape (N,)."""
     out = np.zeros(len(pairs), dtype=bool)
     first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
     same = first[:, :, None] == second[:, None, :]
     single = same.any(axis=(1, 2))
-    # a common corner comes first in both, so that the edge opposite to it is always the one from 1 to 2
+    # rotate a common vertex to the first place in both, so that the edge opposite to it is always the one from 1 to 2
     a, b = (
         points[np.take_along_axis(f, (np.where(single, s.argmax(axis=1), 0)[:, None] + np.arange(3)) % 3, axis=1)]
         for f, s in ((first, same.any(axis=2)), (second, same.any(axis=1)))
@@ -151,16 +153,16 @@ def _cross(points: NDArray[np.float64], faces: NDArray[np.int32], pairs: NDArray
     tolerance = 1e-13 * float(np.abs(points).max(initial=0.0))
     side_a, side_b = _heights(a, b, tolerance), _heights(b, a, tolerance)
     for start, end in ((1, 2), (0, 1), (0, 2)):
-        asked = ~out if start == 1 else ~out & ~single
+        tested = ~out if start == 1 else ~out & ~single
         for edge, other, side in ((a, b, side_a), (b, a, side_b)):
-            rows = np.flatnonzero(asked & (side[:, start] * side[:, end] < 0.0))
+            rows = np.flatnonzero(tested & (side[:, start] * side[:, end] < 0.0))
             passes = _inside(edge[rows, start], edge[rows, end], other[rows])
             out[rows[passes]] = True
     return out
 
 
 def _heights(a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
-    """Height of the corners of faces a over the planes of faces b, 0 within rounding, shape (N, 3)."""
+    """Signed distance of the corners of faces a from the planes of faces b [m], 0 within rounding, shape (N, 3)."""
     normal = np.cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.where(length > 0.0, length, 1.0)
@@ -169,7 +171,7 @@ def _heights(a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float) -
 
 
 def _inside(start: NDArray[np.float64], end: NDArray[np.float64], face: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether lines through start and end pass through faces, borders included: three volumes of one sign."""
+    """Whether lines through start and end pass through faces or their borders (three triple products of one sign)."""
     along = end - start
     corner = face - start[:, None]
     turns = [(along * np.cross(corner[:, i], corner[:, j])).sum(axis=1) for i, j in ((0, 1), (1, 2), (2, 0))]

@@ -1,7 +1,7 @@
-"""Bindings kept in files: what was found out about a rig once need not be found out again by the next process.
+"""Bindings stored in files, so that a rig that was bound before is loaded instead of bound again.
 
-A file holds the domains, the places of the vertices, the fields and the packed operators, with a hash of all that they
-follow from (:mod:`warpjld.covering.kept_key`). A file of anything else is never used.
+A file holds the domains, the vertices' coordinates on their segments, the fields and the packed operators, with a hash
+of all inputs (:mod:`warpjld.covering.kept_key`). A file with another hash is never used.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = ["bind_kept", "load_binding", "save_binding"]
 
 _FORMAT = "warpjld binding 2"
 _RUNS = ("tiles", "runs", "slots", "coefficients", "order")
-_ANCHORS = tuple(field.name for field in fields(Anchors) if field.name != "rest")  # that is the surface's
+_ANCHORS = tuple(field.name for field in fields(Anchors) if field.name != "rest")  # ``rest`` is in the rig's surface
 _PARAMETERS = tuple(field.name for field in fields(Parameters))
 _FIELDS = tuple(field.name for field in fields(Fields))
 _SPARSE = ("data", "indices", "indptr", "shape")
@@ -47,11 +47,14 @@ def bind_kept(
     method: Literal["smooth", "paper"] = "smooth",
     path: Path | None = None,
 ) -> tuple[Covering, tuple[str, ...]]:
-    """``bind_rig``, out of a file where there is one that fits; and what is to be told of it.
+    """``bind_rig``, or the same binding from a file where a valid one exists.
 
     Args:
         rig: The rig; likewise ``skeleton``, ``parameters``, ``domains`` and ``method`` as of ``bind_rig``.
         path: A file that ``save_binding`` wrote; by default one in the cache, which is written if it is missing.
+
+    Returns:
+        The covering, and notes for the user: why an existing file could not be used.
     """
     how: dict[str, Any] = {"skeleton": skeleton, "parameters": parameters, "domains": domains}
     folder = kept_folder()
@@ -83,10 +86,10 @@ def save_binding(
     parameters: Parameters | None = None,
     domains: Literal["geometry", "skin"] = "geometry",
 ) -> None:
-    """Keep the binding that ``bind_rig`` made of a rig with these settings in a file, whole or not at all.
+    """Write the binding that ``bind_rig`` made of a rig with these settings to a file (atomically).
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The file cannot be written.
     """
     key = binding_key(rig, skeleton=skeleton, parameters=parameters, domains=domains)
     with whole_file(path) as part:
@@ -101,15 +104,16 @@ def load_binding(
     parameters: Parameters | None = None,
     domains: Literal["geometry", "skin"] = "geometry",
 ) -> Covering:
-    """The binding of this rig with these settings out of a file.
+    """Read the binding of this rig with these settings from a file.
 
     Raises:
-        InputError: No such file, not a binding, or that of something else.
+        InputError: No such file, not a binding, or one of another rig, other settings or another version.
     """
     return _load(path, binding_key(rig, skeleton=skeleton, parameters=parameters, domains=domains), rig, skeleton)
 
 
 def _write(path: Path, key: str, covering: Covering) -> None:
+    """Write an NPZ archive of a binding with its key."""
     parts = {"runs": (covering.runs, _RUNS), "anchors": (covering.anchors, _ANCHORS)}
     parts["parameters"] = (covering.parameters, _PARAMETERS)
     parts |= {f"fields.{kind}": (getattr(covering.fields, kind), _SPARSE) for kind in _FIELDS}
@@ -123,9 +127,10 @@ def _write(path: Path, key: str, covering: Covering) -> None:
 
 
 def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering:
+    """Read an NPZ archive of a binding; InputError where it is none, or has another key."""
     try:
         if path.is_file() and not zipfile.is_zipfile(path):
-            raise ValueError("no NPZ archive")
+            raise ValueError("not an NPZ archive")
         with np.load(path, allow_pickle=False) as file:
             if str(file["format"]) != _FORMAT:
                 raise InputError("not a binding of this version", path=path)
@@ -151,7 +156,7 @@ def _part(arrays: dict[str, NDArray[Any]], prefix: str, names: tuple[str, ...]) 
 
 @dataclass(frozen=True, eq=False)
 class _KeptFields:
-    """Fields as arrays, by kind: sparse matrices of SciPy's are made of them when they are wanted."""
+    """Fields as plain arrays, from which the call makes SciPy's sparse matrices (SciPy is imported only then)."""
 
     arrays: dict[str, dict[str, NDArray[Any]]]
 

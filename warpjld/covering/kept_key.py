@@ -1,4 +1,4 @@
-"""The name under which a binding is kept: a hash of all that it follows from."""
+"""Key of a stored binding: a hash of its inputs and of the program files that compute it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["binding_key", "binding_sources"]
 
 _MODULES = ("*.py", "covering/*.py", "files/*.py", "geometry/*.py", "rig/*.py", "runtime/*.py", "skeleton/**/*.py")
-"""What binding a rig runs through."""
+"""Program files that binding a rig executes."""
 
 
 def binding_key(
     rig: Rig, *, skeleton: Skeleton | None = None, parameters: Parameters | None = None, domains: str = "geometry"
 ) -> str:
-    """Hash of what ``bind_rig`` is given, and of the programs that bind."""
+    """Hash of the arguments of ``bind_rig``, the version, and the program files that bind."""
     surface = (rig.surface.vertices, rig.surface.faces)
     skin = rig.skin if domains == "skin" else None
     given = (rig.skeleton if skeleton is None else skeleton, parameters, rig.rigid, skin)
@@ -29,5 +29,5 @@ def binding_key(
 
 
 def binding_sources() -> Iterator[tuple[str, Path]]:
-    """Names and places of the files whose content a binding depends on, always in the same order."""
+    """Names and paths of the program files that a binding depends on, in a fixed order."""
     return source_files(_MODULES)

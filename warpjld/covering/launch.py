@@ -1,4 +1,4 @@
-"""Launching the covering's kernels over the frames of a batch."""
+"""Launches of the covering's kernels over the frames of a batch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from warpjld.runtime.threads import in_threads
 
 __all__ = ["lane_of", "launch_gathered", "launch_runs"]
 
-_BUFFERED = 150_000  # vertex-frames that are computed before their rows are written: they stay in the caches
+_BUFFERED = 150_000  # vertices × frames computed before they are reordered, few enough to stay in the CPU's caches
 
 
 def launch_runs(model: list[Any], pose: Any, points: Any, device: Any, threads: int, *, scatter: bool = False) -> None:
@@ -19,7 +19,11 @@ def launch_runs(model: list[Any], pose: Any, points: Any, device: Any, threads: 
 
     Args:
         model: ``tiles``, ``runs``, ``slots``, ``coefficients`` and ``order`` on the device.
-        scatter: In the surface's order instead, on a GPU.
+        pose: Pose inputs (:func:`~warpjld.covering.runs.palette`) on the device.
+        points: Array of vec3 that is filled.
+        device: Warp device.
+        threads: CPU threads to split the frames over.
+        scatter: Write in the surface's order instead, on a GPU.
     """
     from warpjld_kernels.covering_runs import deform_runs
 
@@ -29,7 +33,10 @@ def launch_runs(model: list[Any], pose: Any, points: Any, device: Any, threads: 
 
 
 def launch_gathered(model: list[Any], lane: Any, pose: Any, points: Any, device: Any, threads: int) -> None:
-    """The same on the CPU, vertex v from lane ``lane[v]``: block by block through a buffer."""
+    """Deform all frames on the CPU in the surface's order: runs into a buffer, then vertex v from lane ``lane[v]``.
+
+    Arguments as for :func:`launch_runs`.
+    """
     import warp as wp
     from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs, gather_lanes
 
@@ -40,14 +47,15 @@ def launch_gathered(model: list[Any], lane: Any, pose: Any, points: Any, device:
         packed = wp.empty((min(together, end - begin), lanes + 1), dtype=wp.vec3, device=device)
         for first in range(begin, end, together):
             last = min(first + together, end)
-            some = packed[: last - first]
-            _deform(model, pose[first:last], some, device, False)
-            wp.launch(gather_lanes, dim=last - first, inputs=[some, lane], outputs=[points[first:last]], device=device)
+            part = packed[: last - first]
+            _deform(model, pose[first:last], part, device, False)
+            wp.launch(gather_lanes, dim=last - first, inputs=[part, lane], outputs=[points[first:last]], device=device)
 
     in_threads(span, len(pose), threads, deform_runs, device)
 
 
 def _deform(model: list[Any], pose: Any, points: Any, device: Any, scatter: bool) -> None:
+    """One launch of ``deform_runs`` over the frames of ``pose``."""
     import warp as wp
     from warpjld_kernels.covering_runs import CPU_FRAMES, deform_runs
 
@@ -62,7 +70,7 @@ def _deform(model: list[Any], pose: Any, points: Any, device: Any, scatter: bool
 
 
 def lane_of(order: NDArray[np.int32], vertices: int) -> NDArray[np.int32]:
-    """Lane of every vertex, where stand-ins at the end repeat one."""
+    """Lane of every vertex, shape (V,), from the vertex of every lane; padding lanes at the end are ignored."""
     out = np.empty(vertices, dtype=np.int32)
     out[order[:vertices]] = np.arange(vertices)
     return out

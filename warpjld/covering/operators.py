@@ -1,4 +1,4 @@
-"""Which operators a skeleton gives: one segment for fingers and limbs, several side by side in the palm (R16, R19)."""
+"""Operators of a skeleton: one segment each for fingers and limbs, several side by side in the palm (R16, R19)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ __all__ = ["Fan", "fans", "segment_ends"]
 
 @dataclass(frozen=True)
 class Fan:
-    """The domain of one operator: segments side by side, each a neighbour of the next.
+    """Segments of one operator, side by side, each a neighbour of the next.
 
     A finger or limb is a fan of one segment. The palm's metacarpals are a fan of five, and so are the bones of the
     carpus behind them; inside a fan virtual segments join neighbours (A §4, Fig. 5).
 
     Attributes:
-        name: For reports, e.g. ``left.index.knuckle2`` (the joint where it begins) or ``left.palm``.
-        segments: Side by side, ulnar to radial.
-        muscle: Whether internal muscles inflate: not in the palm (R50).
-        stiff: Whether all of it turns with the bone, as a skull does: no joint rounds it.
+        name: Name in reports, e.g. ``left.index.knuckle2`` (the joint where it begins) or ``left.palm``.
+        segments: Segments from ulnar to radial.
+        muscle: Whether internal muscles inflate; they do not in the palm (R50).
+        stiff: Whether its whole domain turns rigidly with the bone, without rounding, as a skull does.
     """
 
     name: str

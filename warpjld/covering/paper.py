@@ -1,4 +1,5 @@
-"""The paper's own hard-edged variant, to compare: normals, cross products, one segment or one palm pair a vertex."""
+"""The paper's operators as published, with hard borders, as a reference: normals and cross products instead of
+quaternions, and one segment or one palm pair per vertex."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ __all__ = ["Normals", "PaperCovering", "PaperPose", "paper_normals"]
 
 @dataclass(frozen=True, eq=False)
 class Normals:
-    """Normals of F frames.
+    """Normals of joints and segments in F frames.
 
     Attributes:
         original: N_o of every segment at its proximal and distal joint, with that joint straight, shape (F, S, 2, 3):
@@ -51,7 +52,7 @@ def paper_normals(skeleton: Skeleton, ends: NDArray[np.int32], rotations: NDArra
     table = SegmentTable.build(skeleton, ends)
     original = np.einsum("fsij,skj->fski", matrices[:, ends[:, 0]], table.normals)
 
-    # what the segment that ends at a joint and the bone that begins there carry
+    # normals at a joint that are fixed to the segment that ends there, and to the bone that begins there
     after = np.cross(skeleton.directions, skeleton.axes)
     clear = np.linalg.norm(after, axis=1) > 1e-3
     before = after.copy()
@@ -66,13 +67,13 @@ def paper_normals(skeleton: Skeleton, ends: NDArray[np.int32], rotations: NDArra
 class PaperCovering(Covering):
     """A surface bound by the paper's hard-edged operators; made by ``bind(…, method="paper")``.
 
-    The surface tears and folds where domains and areas meet; it is there to be compared with. It deforms through the
-    same methods as :class:`~warpjld.covering.covering.Covering`.
+    The surface tears and folds where domains and areas meet; it serves as a reference. Methods are those of
+    :class:`~warpjld.covering.covering.Covering`.
     """
 
     @cached_property
     def places(self) -> PaperPlaces:
-        """Where the vertices lie on their segment or palm pair, and in which area."""
+        """Coordinates of the vertices on their segment or palm pair, and their areas."""
         where = (self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
         found = paper_places(*where, self.anchors.rigid)
         return found if self.following is None else found.taken_from(_followed(self.following.follow))
@@ -96,13 +97,14 @@ class PaperCovering(Covering):
 
     @property
     def run_surface(self) -> Surface:
-        """The surface itself: these operators are not packed into runs."""
+        """The surface itself, since these operators are not packed into runs."""
         return self.surface
 
     def _launch(self, rows: Any, points: Any, device: Any, threads: int, order: str) -> None:
         self._emit(rows, np.arange(len(self.surface.vertices), dtype=np.int32), points, device, threads)
 
     def _emit(self, pose: PaperPose, chosen: NDArray[np.int32], points: Any, device: Any, threads: int) -> None:
+        """Deform chosen vertices in all frames into the device array ``points``, shape (F, n)."""
         import warp as wp
         from warpjld_kernels.paper import deform_paper
 
@@ -122,7 +124,7 @@ class PaperCovering(Covering):
         in_threads(span, points.shape[0], threads, deform_paper, device)
 
     def _expressed(self, device: Any) -> list[Any]:
-        """Places, parameters, and the coordinates of the vertices in their initial bases, on a device."""
+        """Kernel arguments on a device: places, parameters, and coordinates of the vertices in their initial bases."""
         import warp as wp
         from warpjld_kernels import paper
 
@@ -149,20 +151,26 @@ class PaperCovering(Covering):
 
 
 def _followed(follow: sp.csr_array) -> NDArray[np.int64]:
-    """The vertex whose place each vertex takes, shape (V,): of those it follows the one that counts most, the first of
-    several; its own where it follows none."""
+    """Column of the largest entry of every row of ``follow``, the first of several; a row's own index where it has no
+    entries. Shape (V,)."""
     out = np.arange(follow.shape[0])
-    # as rounded: of barycentric weights, no processor's last digits are to choose
+    # rounded, so that ties of barycentric weights do not depend on the last digits
     order = np.lexsort((follow.indices, -follow.data.round(6), np.repeat(out, np.diff(follow.indptr))))
-    some = np.diff(follow.indptr) > 0
-    out[some] = follow.indices[order][follow.indptr[:-1][some]]
+    filled = np.diff(follow.indptr) > 0
+    out[filled] = follow.indices[order][follow.indptr[:-1][filled]]
     return out
 
 
 @dataclass(frozen=True, eq=False)
 class PaperPose:
-    """What F poses give the paper's operators: positions (F, J, 3), normals, flexion ratios (F, J), and rotations
-    (F, J, 4), which only what is rigid asks for."""
+    """Pose inputs of the paper's operators in F frames.
+
+    Attributes:
+        positions: Joint positions [m], shape (F, J, 3).
+        original, modified: As in :class:`Normals`.
+        flexion_ratio: FR of every joint, shape (F, J).
+        rotations: Rotations of the bones, x y z w, shape (F, J, 4), used by rigid vertices only.
+    """
 
     positions: NDArray[np.float64]
     original: NDArray[np.float64]

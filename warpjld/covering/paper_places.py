@@ -14,22 +14,23 @@ from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["PaperPlaces", "paper_places"]
 
-_SAME_DOMAIN = 1e-6  # weights of operators that differ by less, as solvers leave it, are equal
+_SAME_DOMAIN = 1e-6  # weights of operators that differ by less (error of the solvers) count as equal
 
 
 @dataclass(frozen=True, eq=False)
 class PaperPlaces:
-    """Places of V vertices.
+    """Coordinates of V vertices on their segments.
 
     Attributes:
         ends: Proximal and distal joint of every segment, shape (S, 2).
         muscle: Whether a segment's internal muscle inflates, shape (S,).
-        segment: The segment a vertex lies on, and the neighbour towards which it lies in between, shape (V, 2).
+        segment: The segment a vertex lies on, and the neighbouring segment on whose side it lies, shape (V, 2).
         ratio: Its projections on both, shape (V, 2) (R37, C1).
-        across: Its projection on the virtual segment from the one to the other, shape (V,) (R53).
+        across: Its projection on the virtual segment from the first to the second, shape (V,) (R53).
         between: Whether it lies in areas 2, 5, 8 of the palm, shape (V,) (R49).
         external: Whether it lies on the external side, shape (V,) (R45).
-        rigid: Joint that a vertex follows with its bone, -1 for those that the rest is about, shape (V,).
+        rigid: Joint whose bone a rigid vertex follows, -1 for flesh, shape (V,); for rigid vertices the other
+            attributes have no meaning.
     """
 
     ends: NDArray[np.int32]
@@ -42,8 +43,8 @@ class PaperPlaces:
     rigid: NDArray[np.int32]
 
     def taken_from(self, vertex: NDArray[np.int64]) -> PaperPlaces:
-        """Places where every vertex moves as another does, shape (V,), for shells that lie on the skin and borders that
-        are one (R18); what is rigid keeps its own."""
+        """Places copied to every vertex from another, shape (V,), for shells that lie on the skin and for coincident
+        borders (R18); rigid vertices keep their own."""
         chosen = np.where((self.rigid >= 0) | (self.rigid[vertex] >= 0), np.arange(len(vertex)), vertex)
         moved = {name: getattr(self, name)[chosen] for name in ("segment", "ratio", "across", "between", "external")}
         return replace(self, **moved)
@@ -57,15 +58,15 @@ def paper_places(
     parameters: Parameters,
     rigid: NDArray[np.int32] | None = None,
 ) -> PaperPlaces:
-    """Give every vertex to its strongest operator, and inside the palm to one of the nine areas (A Fig. 7).
+    """Assign every vertex to its strongest operator, and inside the palm to one of the nine areas (A Fig. 7).
 
-    Inside the palm the nearest segment is the one to cover; the neighbour is the one on whose side the vertex lies.
+    Inside the palm a vertex belongs to the nearest segment; its neighbour is the one on whose side the vertex lies.
     External vertices within the proximity of either segment belong to it (columns 1-4-7 and 3-6-9), else they lie in
     between. Internal vertices lie in between where they project on the virtual segment: no proximities there (C10).
 
-    Borders and ties are decided with a margin, so that every processor decides alike: of equal operators and segments
-    the first is taken, of equal neighbours the one after; a vertex on the border between outside and inside is
-    external, and one on the border of an area in between belongs to the segment.
+    Borders and ties are decided with a margin, so that rounding does not matter: of equal operators and segments the
+    first is taken, of equal neighbours the next one; a vertex on the border between the sides is external, and one on
+    the border of an in-between area belongs to the segment.
 
     Args:
         vertices: Rest positions [m], shape (V, 3).
@@ -73,7 +74,7 @@ def paper_places(
         groups: Operators, from :func:`~warpjld.covering.operators.fans`.
         domains: Weight of every fan, shape (V, fans).
         parameters: Their proximities bound the areas.
-        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); all is flesh by default.
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); by default all vertices are flesh.
     """
     ends = segment_ends(groups)
     table = SegmentTable.build(skeleton, ends)
@@ -86,12 +87,12 @@ def paper_places(
     first = 0
     for f, fan in enumerate(groups):
         size = len(fan.segments)
-        mine = np.flatnonzero(owner == f)
-        segment[mine] = first
-        if size > 1 and mine.size:
+        members = np.flatnonzero(owner == f)
+        segment[members] = first
+        if size > 1 and members.size:
             inside = slice(first, first + size)
-            chosen = _palm_place(vertices[mine], table, ratio[mine, inside], inside, parameters, tie)
-            segment[mine], across[mine], between[mine] = first + chosen[0], chosen[1], chosen[2]
+            chosen = _palm_place(vertices[members], table, ratio[members, inside], inside, parameters, tie)
+            segment[members], across[members], between[members] = first + chosen[0], chosen[1], chosen[2]
         first += size
     both = np.take_along_axis(ratio, segment, axis=1)
     external = _height(vertices, table, segment, both, np.where(between, across, 0.0)) >= -tie
@@ -108,7 +109,7 @@ def _palm_place(
     parameters: Parameters,
     tie: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Segment and neighbour counted from the fan's first, the ratio across, and whether in between."""
+    """Segment and neighbour as indices in the fan (n, 2), ratio across (n,), and whether in between (n,)."""
     rows = np.arange(len(points))
     feet = table.start[inside] + ratio[..., None] * table.along[inside]
     size = feet.shape[1]
@@ -130,21 +131,21 @@ def _palm_place(
     joints = table.ends[inside]
     width = (1.0 - place) * parameters.proximity[joints[:, 0], 0] + place * parameters.proximity[joints[:, 1], 1]
     here, there = width[rows, nearest], width[rows, neighbour]
-    total = np.maximum(here + there, 1.0)  # wide proximities leave nothing in between
+    total = np.maximum(here + there, 1.0)  # proximities that sum to more than 1 are scaled, with no area in between
     alone = np.isneginf(across)
     normal = _blended(table, inside.start + nearest, place[rows, nearest])
     external = ((points - feet[rows, nearest]) * normal).sum(axis=1) >= -tie
     low = np.where(external, here / total, 0.0)
     high = np.where(external, 1.0 - there / total, 1.0)
     between = ~alone & (across > low + SNAP) & (across < high - SNAP)
-    on_neighbour = ~alone & (across > low + SNAP) & (across >= high - SNAP)  # a wrong assignment is mended here (R68)
+    on_neighbour = ~alone & (across > low + SNAP) & (across >= high - SNAP)  # wrong assignments are corrected (R68)
     segment = np.where(on_neighbour, neighbour, nearest)
     other = np.where(on_neighbour, nearest, neighbour)
     return np.column_stack([segment, other]), np.where(between, across, 0.0), between
 
 
 def _first_largest(values: NDArray[np.float64], tie: float) -> NDArray[np.int64]:
-    """Column of the first of the values that are largest but for ``tie``, of every row."""
+    """Column of the first value within ``tie`` of the largest one, for every row."""
     first: NDArray[np.int64] = (values >= values.max(axis=1, keepdims=True) - tie).argmax(axis=1)
     return first
 
@@ -156,7 +157,7 @@ def _height(
     ratio: NDArray[np.float64],
     across: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(vertex − projection) · normal, whose sign is that of R45's cosine."""
+    """(vertex − projection) · normal [m], of the sign of R45's cosine, shape (V,)."""
     feet = table.start[segment] + ratio[..., None] * table.along[segment]
     normals = [_blended(table, segment[:, k], np.clip(ratio[:, k], 0.0, 1.0)) for k in (0, 1)]
     part = across[:, None]
@@ -167,6 +168,7 @@ def _height(
 
 
 def _blended(table: SegmentTable, segment: NDArray, ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Normals interpolated between the two ends of segments, not normalised, shape (n, 3)."""
     blend = ratio[:, None]
     normal: NDArray[np.float64] = (1.0 - blend) * table.normals[segment, 0] + blend * table.normals[segment, 1]
     return normal

@@ -1,4 +1,4 @@
-"""The animator's parameters of every joint (A §3, R22–R24), and the files that carry them."""
+"""The animator's parameters of every joint (A §3, R22–R24), their defaults, and their files."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from warpjld.suggest import one_of
 
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
 
-_SHAPES = ("proximity", "peak", "exponents")  # what shapes fields on the surface; the others are amplitudes of them
+_SHAPES = ("proximity", "peak", "exponents")  # parameters that shape the coefficient fields; the others scale them
 
-_INFLATION = 0.1  # of a 90° joint: knuckles are rounded, and half of the volume that a tube loses there is put back
-_PALM = 3.0  # times as much flesh lies on a joint of the palm as on one of a finger (assumed)
-_WIDEST = np.radians(135.0)  # wider limits say what a joint never does alone
+_INFLATION = 0.1  # default for a 90° joint: rounds knuckles, and restores half of the volume that a tube loses there
+_PALM = 3.0  # amount of flesh at a joint of the palm relative to a finger's (assumed)
+_WIDEST = np.radians(135.0)  # bound of the flexion in defaults: wider limits are not reached by a joint alone
 
 
-_MOST = 1e3  # of any parameter: defaults are about one
+_MOST = 1e3  # largest value of any parameter; defaults are about one
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """Parameters of J joints. A segment is governed by the joints at its two ends.
+    """Parameters of J joints. Those of the joints at its two ends determine a segment's deformation.
 
     Attributes:
         inflation: Amplitude of the rounding of a joint at full flexion, shape (J,) (R22a, R58–R62).
@@ -63,7 +63,7 @@ class Parameters:
         return f"Parameters(of {len(self.inflation)} joints)"
 
     def shapes_like(self, other: Parameters) -> bool:
-        """Whether fields are shaped alike: only amplitudes differ, if anything does."""
+        """Whether the parameters that shape coefficient fields are equal, so that at most amplitudes differ."""
         return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in _SHAPES)
 
     def check(self, skeleton: Skeleton) -> None:
@@ -79,7 +79,7 @@ class Parameters:
                 raise InputError(f"parameters.{field.name} of '{name}' must be finite and ≥ 0, and {_MOST:g} at most")
         outside = np.flatnonzero((self.peak <= 0.0) | (self.peak >= 1.0))
         if outside.size:
-            raise InputError(f"peak of '{skeleton.names[outside[0]]}' must lie between 0 and 1")
+            raise InputError(f"parameters.peak of '{skeleton.names[outside[0]]}' must lie between 0 and 1")
         for segment in skeleton.segments:
             total = self.proximity[segment.proximal, 0] + self.proximity[segment.distal, 1]
             if total > 1.0 + 1e-9:
@@ -88,13 +88,13 @@ class Parameters:
 
 
 def default_parameters(skeleton: Skeleton) -> Parameters:
-    """Defaults: joints round as much as their flexion asks for, muscles are left to the animator.
+    """Defaults: inflation by the volume that maximal flexion would lose, and no muscles.
 
-    A section turned by φ against its segment loses 1 − cos φ of its volume. The bisector turns sections by up to θ/2,
-    so a joint bent by θ costs 1 − sin(θ/2)/(θ/2) of what lies around it. Inflation is relative to the maximal flexion
-    (R59), so its amplitudes follow that loss at the maximal flexion: a 20° metacarpal joint gets a twentieth of a
-    knuckle. What a surface loses all the same, its swelling puts back (``warpjld.covering.swelling``); muscles that
-    bulge inside a bend (R63) would be folded in by it.
+    A cross-section turned by φ against its segment loses 1 − cos φ of its volume. The bisector turns cross-sections by
+    up to θ/2, so a joint bent by θ loses 1 − sin(θ/2)/(θ/2) of the volume around it. Inflation is relative to the
+    maximal flexion (R59), so its amplitudes are proportional to that loss at the maximal flexion: a 20° metacarpal
+    joint gets a twentieth of a knuckle's. The remaining loss is compensated by swelling
+    (``warpjld.covering.swelling``); muscles, which bulge inside a bend (R63), would be folded in by it.
 
     Where a finger meets the palm inflation is three times as large: the palm loses volume at that joint too.
     """
@@ -119,6 +119,7 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
 
 
 def _volume_loss(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of the volume around a joint lost by bending it by an angle [rad]."""
     half = np.maximum(angle / 2.0, 1e-3)
     return 1.0 - np.sin(half) / half
 
@@ -127,7 +128,7 @@ def save_parameters(path: str | Path, skeleton: Skeleton, parameters: Parameters
     """Write a parameter file (JSON: joint → values).
 
     Raises:
-        InputError: It cannot be written.
+        InputError: The file cannot be written.
 
     Examples:
         >>> from tempfile import mkdtemp
@@ -169,6 +170,7 @@ def load_parameters(path: str | Path, skeleton: Skeleton) -> Parameters:
 
 
 def _parameters(content: Any, skeleton: Skeleton) -> Parameters:
+    """Checked parameters from the parsed JSON of a parameter file."""
     joints = content.get("joints") if isinstance(content, dict) else None
     if not isinstance(joints, dict) or not all(isinstance(values, dict) for values in joints.values()):
         raise InputError("want a JSON object with a 'joints' object that holds values by joint")

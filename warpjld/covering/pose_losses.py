@@ -1,4 +1,4 @@
-"""The losses of a set of poses, as functions of a covering's amplitudes."""
+"""Calibration losses of a set of poses, as functions of a covering's amplitudes."""
 
 from __future__ import annotations
 
@@ -17,22 +17,21 @@ __all__ = ["PoseLosses"]
 
 
 class PoseLosses:
-    """The losses of all poses of a covering, and what amplitudes move in each.
+    """The losses of all poses of a covering, and the vertices that amplitudes move in each.
 
     Attributes:
-        of_pose: Loss of each pose; None where amplitudes move nothing.
-        moved: Vertices that they move.
+        of_pose: Loss of each pose; None where amplitudes move no vertex.
+        moved: Vertices that amplitudes move, one array a pose.
         regions: Volume that they move [m³], shape (F,).
         still: Sum of the squared growth of the dihedral angles that they do not change [rad²], shape (F,).
-        ratios: Flexion ratios, shape (F, J).
 
     Args:
-        covering: At the amplitudes to start from.
+        covering: The covering with the amplitudes to start from.
         poses: F poses.
-        fitted: The first that many are fitted to, the others are only held.
+        fitted: Number of poses to fit to, the first ones; the others only have constraints.
         weights: Weights of the terms.
-        tolerances: What a pose may be worse by.
-        progress: Called with poses done, and how many there are.
+        tolerances: By how much a pose may be worse than at the start.
+        progress: Called with the number of poses done, and of all.
     """
 
     def __init__(
@@ -62,10 +61,10 @@ class PoseLosses:
 
     @property
     def parts(self) -> list[PoseLoss]:
-        """Of all poses in which amplitudes move anything."""
+        """Losses of all poses in which amplitudes move any vertex."""
         return [part for part in self.of_pose if part is not None]
 
     @property
     def fitted(self) -> list[PoseLoss]:
-        """Those of them that are fitted to."""
+        """Those of the poses to fit to."""
         return [part for part in self.of_pose[: self._fitted] if part is not None]

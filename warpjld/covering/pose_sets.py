@@ -1,4 +1,4 @@
-"""Poses to calibrate and judge a covering by: every joint alone, curls and fists, and random ones."""
+"""Sets of poses for calibrating and assessing a covering: single joints, curls, fists, and random poses."""
 
 from __future__ import annotations
 
@@ -16,31 +16,32 @@ from warpjld.skeleton.tree import CHANNELS, Skeleton
 __all__ = ["CURL", "calibration_poses", "curled", "guard_poses"]
 
 CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
-"""Flexion [degrees] of a finger's joints in a full curl; the thumb takes no part."""
+"""Flexion [degrees] of a finger's joints in a full curl; the thumb is not curled."""
 
 _ABDUCTION = CHANNELS.index("abduction")
-_WIDEST = np.radians(120.0)  # shoulders, knees and elbows in full are contact of the limbs
-_UNKNOWN = np.radians(30.0)  # where limits are as wide one way as the other: nothing is known of the joint
+_WIDEST = np.radians(120.0)  # largest flexion used: beyond, limbs touch each other at shoulders, knees and elbows
+_UNKNOWN = np.radians(30.0)  # flexion used where limits are symmetric, so that the joint's direction is not known
 _TOE = re.compile(r"^toe\d")
-_CURLS = (0.3, 0.6, 0.9)  # of `CURL`
-_BETWEEN = (0.4, 0.5, 0.7, 0.8)  # of `CURL`, taken after those
-_ONE_BY_ONE = (0.45, 0.9)  # of every digit's own range, the other digits at rest
+_CURLS = (0.3, 0.6, 0.9)  # fractions of `CURL`
+_BETWEEN = (0.4, 0.5, 0.7, 0.8)  # further fractions of `CURL`, of lower priority
+_ONE_BY_ONE = (0.45, 0.9)  # fractions of the range of a single digit, the others at rest
 
 
 def curled(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> Poses:
-    """Index to pinky of every hand curled by fractions of ``CURL``, one a frame."""
+    """Poses with index to pinky of every hand curled by fractions of ``CURL``, one frame a fraction."""
     return poses_beside_rest(skeleton, _curls(skeleton, amounts))
 
 
 def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
-    """Poses to fit to, over the joint ranges of a skeleton, in the order in which they matter.
+    """Poses to fit to, over the joint ranges of a skeleton, in order of importance.
 
     Curls of 0.3, 0.6 and 0.9 and between, digits curled one by one, thumbs opposed and spread, every joint alone at
-    its full and half flexion: in each pose what is lost belongs to few joints, so none has to make up for others.
+    its full and half flexion: the volume lost in each pose depends on few joints, so that no joint is fitted to
+    compensate for others.
 
     Args:
         skeleton: The rest skeleton.
-        count: How many to take: the first of each kind in turn; by default all.
+        count: Number of poses, taken from each kind in turn; by default all.
 
     Raises:
         InputError: A skeleton whose joints cannot flex, or a count below 1.
@@ -64,10 +65,10 @@ def calibration_poses(skeleton: Skeleton, count: int | None = None) -> Poses:
 
 
 def guard_poses(skeleton: Skeleton, *, seed: int = 0) -> Poses:
-    """Poses of many joints at once, that nothing is fitted to but none of which may get worse.
+    """Poses that calibration is not fitted to, but that may not get worse, mostly with many joints bent at once.
 
     Fists (every joint of the digits at 0.5 and 0.8 of its flexion), joints of trunk, arms and legs alone at three
-    quarters, and random poses within the limits, alike on both sides of a body.
+    quarters, and random poses within the limits, the same on both sides of a body.
 
     Raises:
         InputError: A skeleton whose joints cannot flex.
@@ -89,11 +90,12 @@ def _range(skeleton: Skeleton) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     inner = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
     bends = np.flatnonzero(inner & (largest > 1e-6))
     if not bends.size:
-        raise InputError("skeleton: none of its joints may flex; its limits are closed")
+        raise InputError("skeleton: none of its joints may flex; want flexion limits above 0 for at least one")
     return bends, largest
 
 
 def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tuple[float, ...]) -> NDArray[np.float64]:
+    """Angles of :func:`curled`, shape (amounts, J, channels); no frames where the skeleton has no fingers."""
     joints = [
         (j, CURL[name.rpartition(".")[2]])
         for j, name in enumerate(skeleton.names)
@@ -108,18 +110,18 @@ def _curls(skeleton: Skeleton, amounts: NDArray[np.float64] | list[float] | tupl
 
 
 def _digits(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Digits one by one, half and nearly curled, on all hands at once."""
+    """Angles with single digits curled by ``_ONE_BY_ONE``, on all hands at once, shape (F, J, channels)."""
     full = _curls(skeleton, [1.0])[0] if _curls(skeleton, [1.0]).size else np.zeros((len(skeleton), len(CHANNELS)))
     thumbs = [j for j in bends if _digit(skeleton.names[j]) == DIGITS[-1] and not skeleton.names[j].endswith(".base")]
     full[thumbs, FLEXION] = largest[thumbs]
     digit = np.array([_digit(name) for name in skeleton.names])
     alone = [np.where((digit == d)[:, None], full, 0.0) for d in DIGITS]
-    angles = [part * one for one in alone if one.any() for part in _ONE_BY_ONE]
+    angles = [part * curl for curl in alone if curl.any() for part in _ONE_BY_ONE]
     return np.array(angles).reshape(-1, len(skeleton), len(CHANNELS))
 
 
 def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Metacarpals and fingers half and nearly closed, the thumb opposed and bent beside them."""
+    """Angles with metacarpals and fingers flexed by 0.5 and 0.8 of their range, the thumb opposed and bent."""
     digits = [j for j in bends if _digit(skeleton.names[j])]
     roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
     angles = np.zeros((2, len(skeleton), len(CHANNELS)))
@@ -130,7 +132,7 @@ def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.flo
 
 
 def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Thumbs opposed and spread."""
+    """Angles with the thumbs opposed, and spread."""
     roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
     angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, end in ((0, 0), (1, 1)):
@@ -142,7 +144,7 @@ def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.fl
 def _random(
     skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], seed: int, frames: int = 4
 ) -> NDArray[np.float64]:
-    """Flexion anywhere up to the limit, abduction in the inner half of its range."""
+    """Random angles: flexion up to the largest, abduction in the inner half of its range, shape (F, J, channels)."""
     generator = np.random.default_rng(seed)
     known, kind = _without_side(skeleton, bends)
     angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
@@ -156,7 +158,7 @@ def _random(
 def _alone(
     skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.float64], part: float
 ) -> NDArray[np.float64]:
-    """One joint a frame, on both sides of a body at once."""
+    """Angles with one joint a frame flexed by a part of its range, on both sides of a body at once."""
     known, kind = _without_side(skeleton, bends)
     angles = np.zeros((len(known), len(skeleton), len(CHANNELS)))
     angles[kind, bends, FLEXION] = part * largest[bends]
@@ -164,13 +166,14 @@ def _alone(
 
 
 def _without_side(skeleton: Skeleton, joints: NDArray[np.int64]) -> tuple[list[str], NDArray[np.int64]]:
-    """Names of joints without their side, in the order in which they come, and which of them each joint is. Toes, which
-    nobody looks at one by one, are one."""
+    """Distinct names of joints without their side, in order of appearance, and the index of each joint's name, shape
+    (joints,). All toes share one name, so that they are bent together."""
     names = [_TOE.sub("toe", skeleton.names[j].removeprefix("left.").removeprefix("right.")) for j in joints]
     known = list(dict.fromkeys(names))
     return known, np.array([known.index(name) for name in names], dtype=np.int64)
 
 
 def _digit(name: str) -> str:
+    """Name of the digit that a joint belongs to, empty for other joints."""
     parts = name.split(".")
     return parts[-2] if len(parts) > 1 and parts[-2] in DIGITS else ""

@@ -1,4 +1,4 @@
-"""How good a deformation is: enclosed volume, edge stretch, reversed edges and faces. All in float64."""
+"""Quality measures of a deformed surface: enclosed volume, edge stretch, reversed edges and faces. All in float64."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Stretch:
-    """Edge length over rest length, as four numbers: smallest, 1 %, 99 %, largest."""
+    """Distribution of edge length over rest length: smallest, 1st and 99th percentile, largest."""
 
     smallest: float
     low: float
@@ -41,7 +41,7 @@ class Stretch:
 
     @staticmethod
     def of(ratios: NDArray[np.float64]) -> Stretch:
-        """Of the ratios of one frame, shape (E,)."""
+        """Distribution of the ratios of one frame, shape (E,)."""
         low, high = np.percentile(ratios, [1.0, 99.0])
         return Stretch(float(ratios.min()), float(low), float(high), float(ratios.max()))
 
@@ -50,10 +50,10 @@ class Stretch:
 
 
 def closing_fans(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What closes an open surface: its boundary edges, and the loop each belongs to.
+    """Boundary edges of an open surface and their loops, from which triangle fans that close it are made.
 
-    An edge (a, b) of loop l stands for the triangle b, a, c with c the mean of the vertices of l, so a hand that is
-    open at the wrist has a volume. Closed surfaces have none.
+    An edge (a, b) of loop l stands for the triangle b, a, c with c the mean of the vertices of l, so that a hand that
+    is open at the wrist has a volume. Closed surfaces have no such edges.
 
     Returns:
         Boundary edges in the direction of their faces, shape (B, 2), and loop numbers from 0, shape (B,).
@@ -81,7 +81,7 @@ def enclosed_volume(vertices: ArrayLike, faces: NDArray[np.int32]) -> NDArray[np
         Shape (...), a zero-dimensional array for one frame.
     """
     points = np.asarray(vertices, dtype=np.float64)
-    points = points - points.mean(axis=-2, keepdims=True)  # a volume far from the origin would cancel
+    points = points - points.mean(axis=-2, keepdims=True)  # against cancellation far from the origin
     a, b, c = (points[..., faces[:, k], :] for k in range(3))
     six = np.einsum("...ti,...ti->...", a, np.cross(b, c))
     boundary, loop = closing_fans(faces)
@@ -117,9 +117,9 @@ def edge_stretch(rest: ArrayLike, vertices: ArrayLike, edges: NDArray[np.int64])
 def reversed_edges(
     rest: ArrayLike, vertices: ArrayLike, edges: NDArray[np.int64], rotations: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Edges that run backwards: against the rest edge carried along by the rotation of its ends, shape (..., E).
+    """Edges whose direction is opposite to the rest edge turned by the rotation of its ends, shape (..., E).
 
-    Along a tube this is a section that has passed its neighbour.
+    Along a tube this is a cross-section that has passed its neighbour.
 
     Args:
         rest: Rest positions [m], shape (V, 3).
@@ -134,7 +134,7 @@ def reversed_edges(
 def reversed_faces(
     rest: ArrayLike, vertices: ArrayLike, faces: NDArray[np.int32], rotations: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Faces turned inside out: normal against the rest normal carried along by their corners, shape (..., T).
+    """Faces whose normal is opposite to the rest normal turned by the rotation of their corners, shape (..., T).
 
     Arguments as for :func:`reversed_edges`, with triangles (T, 3).
     """

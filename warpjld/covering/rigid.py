@@ -1,4 +1,4 @@
-"""What of a surface is rigid: eyes, armour, shoes go with a bone, and take no part in what flesh does."""
+"""Rigid vertices of a surface, which follow one bone and are excluded from the operators: eyes, armour, shoes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ __all__ = ["domains_of_rigid", "part_of_surface", "without_rigid"]
 
 
 def domains_of_rigid(rigid: NDArray[np.int32], skeleton: Skeleton, groups: tuple[Fan, ...]) -> NDArray[np.float64]:
-    """The operator that each rigid vertex is counted with, as weights of one and zero, shape (V, fans); rows of flesh
-    are zero.
+    """Operator to which each rigid vertex is assigned, as weights of one and zero, shape (V, fans); rows of flesh are
+    zero.
 
-    It is one that begins at the vertex's joint, else, at a tip, the one that ends there, else that of a joint before.
+    It is one that begins at the vertex's joint, else, at a tip, the one that ends there, else that of the nearest
+    ancestor that has one.
     """
     begins = {s.proximal: f for f, fan in reversed(list(enumerate(groups))) for s in fan.segments}
     ends = {s.distal: f for f, fan in reversed(list(enumerate(groups))) for s in fan.segments}
@@ -34,7 +35,7 @@ def domains_of_rigid(rigid: NDArray[np.int32], skeleton: Skeleton, groups: tuple
 def part_of_surface(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], chosen: NDArray[np.integer]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Vertices of a surface, in the order given, and the faces that lie wholly among them."""
+    """Chosen vertices of a surface, in the order given, and the faces all of whose vertices are chosen."""
     if len(chosen) == len(vertices):
         return vertices, faces
     number = np.full(len(vertices), -1, dtype=np.int32)
@@ -44,7 +45,7 @@ def part_of_surface(
 
 
 def without_rigid(surface: Surface, rigid: NDArray[np.int32]) -> Surface:
-    """The surface without its rigid faces; vertices keep their numbers."""
+    """The surface without faces whose vertices are all rigid; vertices keep their indices."""
     if (rigid < 0).all():
         return surface
     return replace(surface, faces=surface.faces[(rigid[surface.faces] < 0).any(axis=1)])

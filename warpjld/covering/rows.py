@@ -1,4 +1,4 @@
-"""What the kernels read of a vertex: a row of coefficients for each kind of pose input, with all amplitudes in it."""
+"""Rows of coefficients per vertex and kind of pose input, amplitudes included, and their layout for the kernels."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ __all__ = ["Padded", "Rows", "palm_exponents", "pose_on", "rows_of", "rows_on", 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Coefficients of V vertices.
+    """Coefficients of V vertices with amplitudes.
 
     Attributes:
-        positions: Of the joints' positions, shape (V, J).
+        positions: Coefficients of the joints' positions, shape (V, J).
         turns: Of the halfway rotations and the bones' rotations, shape (V, 2 J).
         scales: Of the flexion ratios and of the palm pairs' thickening, shape (V, J + N · STATIONS).
-        muscles: Of the segments' muscles, shape (V, S), without
-        heights: the vector that each entry of ``muscles`` scales [m], shape (entries, 3).
-        offset: d [m], shape (V, 3).
+        muscles: Of the segments' muscles, shape (V, S).
+        heights: Height vector that each entry of ``muscles`` multiplies [m], shape (entries, 3).
+        offset: d of straight joints [m], shape (V, 3).
     """
 
     positions: sp.csr_array
@@ -55,9 +55,9 @@ def rows_of(
 ) -> Rows:
     """Rows of diffused and thinned fields with these amplitudes (R58–R65).
 
-    Roundings scale with the inflation of their joint, muscles with that of the joint where the segment begins, and
-    swellings with an amplitude of their own for each joint, shape (J,), without which nothing swells. Offsets are those
-    of straight joints: at rest the inflation of the initial angles makes the rest pose of them (C24, R25).
+    Roundings are multiplied by the inflation of their joint, muscles by the muscle amplitude of the joint where the
+    segment begins, and swellings by the amplitude ``swelling`` of their joint, shape (J,), zero by default. Offsets are
+    those of straight joints: together with the inflation by the initial angles they give the rest pose (C24, R25).
     """
     muscles = _times(fields.muscles, parameters.muscle[anchors.ends[:, 0]])
     scales = _times(fields.roundings, parameters.inflation)
@@ -78,13 +78,13 @@ def rows_of(
 
 
 def _times(fields: sp.csr_array, amplitudes: NDArray[np.float64]) -> sp.csr_array:
-    """Columns times their amplitudes. Entries stay where that is zero: there are derivatives by it all the same."""
+    """Columns times their amplitudes. Entries are stored even where that is zero, since derivatives need them."""
     data = fields.data * amplitudes[fields.indices]
     return sp.csr_array((data, fields.indices.copy(), fields.indptr.copy()), shape=fields.shape)
 
 
 def _sum(a: sp.csr_array, b: sp.csr_array) -> sp.csr_array:
-    """a + b with the entries of either, zeros too."""
+    """a + b with the stored entries of both, zeros included."""
     parts = [m.tocoo() for m in (a, b)]
     index = tuple(np.concatenate([part.coords[k] for part in parts]) for k in (0, 1))
     return sp.coo_array((np.concatenate([part.data for part in parts]), index), shape=a.shape).tocsr()
@@ -114,12 +114,12 @@ def palm_exponents(anchors: Anchors, parameters: Parameters) -> NDArray[np.float
 
 @dataclass(frozen=True, eq=False)
 class Padded:
-    """A sparse matrix as two arrays of one width; rows end with zeros.
+    """A sparse matrix in ELLPACK layout: arrays of one width K, rows padded with zeros.
 
     Attributes:
-        column: Shape (V, K).
-        value: Shape (V, K) or (V, K, 3).
-        entry: Place of each value among the matrix's entries, -1 for the zeros, shape (V, K).
+        column: Column of each entry, shape (V, K).
+        value: Value of each entry, shape (V, K) or (V, K, 3).
+        entry: Index of each entry in the matrix's ``data``, -1 for padding, shape (V, K).
     """
 
     column: NDArray[np.int32]
@@ -128,7 +128,7 @@ class Padded:
 
     @staticmethod
     def of(matrix: sp.csr_array, values: NDArray[np.float64] | None = None) -> Padded:
-        """Of a matrix, with other values than its own in the place of its entries if given."""
+        """Layout of a matrix; ``values``, if given, replace its entries' values, shape (entries, …)."""
         length = np.diff(matrix.indptr)
         width = max(int(length.max(initial=0)), 1)
         inside = np.arange(width) < length[:, None]
@@ -142,14 +142,14 @@ class Padded:
         return Padded(column, value, entry)
 
     def sums(self, slopes: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-        """Numbers laid out as ``value`` back in the order of the matrix's entries, shape (size, …)."""
+        """Values in this layout, in the order of the matrix's entries, shape (size, …)."""
         out = np.zeros((size, *slopes.shape[2:]))
         out[self.entry[self.entry >= 0]] = slopes[self.entry >= 0]
         return out
 
 
 def rows_on(device: Any, rows: Rows, *, requires_grad: bool = False) -> Any:
-    """``warpjld_kernels.rows.Rows`` on a device."""
+    """The rows as the kernels' struct ``warpjld_kernels.rows.Rows`` on a device."""
     import warp as wp
     from warpjld_kernels import rows as kernels
 

@@ -1,4 +1,4 @@
-"""Packing anchors into runs: vertices sorted by the joints and rotations they use, so that lanes need no gathers."""
+"""Packing of coefficients into runs: vertices that use the same pose inputs, computed in lanes without gathers."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ __all__ = ["Columns", "Runs", "pack", "pack_runs", "palette"]
 
 @dataclass(frozen=True)
 class Columns:
-    """Where each input begins in a row of the palette; places of the joints come first.
+    """Layout of the palette, a row of all pose inputs of a frame: the first column of each kind, positions first.
 
     Attributes:
-        joints: J of the skeleton.
-        segments: Of the operators.
-        pairs: Neighbours in palms.
+        joints: Number of joints, J.
+        segments: Number of segments of the operators, S.
+        pairs: Number of pairs of palm neighbours, N.
     """
 
     joints: int
@@ -64,12 +64,12 @@ class Columns:
 
     @property
     def kinds(self) -> tuple[int, ...]:
-        """Where joints, rotations, scales and muscles begin, and where they end."""
+        """First columns of positions, rotations, scales and muscles, and the end of the last."""
         return 0, self.halfway, self.flexion_ratio, self.muscles, self.width
 
     @property
     def width(self) -> int:
-        """Numbers in a row."""
+        """Number of columns."""
         return self.muscles + self.segments
 
 
@@ -78,13 +78,14 @@ class Runs:
     """Arguments of ``warpjld_kernels.covering_runs.deform_runs`` that do not depend on the pose.
 
     Attributes:
-        columns: Of the palette.
-        tiles: Run and first lane in it of every tile, shape (tiles, 2).
-        runs: Of every run its first lane, its vertices, its first coefficient, its first slot, and how many slots are
-            joints, rotations, scales and muscles, shape (runs, 8).
+        columns: Layout of the palette.
+        tiles: Run, and first lane within it, of every tile, shape (tiles, 2).
+        runs: First lane, number of vertices, first coefficient, first slot, and numbers of slots that are positions,
+            rotations, scales and muscles, of every run, shape (runs, 8).
         slots: Palette columns that the runs read, run by run.
-        coefficients: Rows of a run's slots one after another, a muscle's three, then offsets; a column a vertex.
-        order: Vertex at every lane, those of the runs one after another.
+        coefficients: For every run a row for each slot but the muscles', three rows of offsets, and three for each
+            muscle, with a column for each vertex.
+        order: Vertex of every lane, run by run.
     """
 
     columns: Columns
@@ -95,7 +96,7 @@ class Runs:
     order: NDArray[np.int32]
 
     def lanes(self) -> NDArray[np.int32]:
-        """Tiles of a single vertex, for devices whose threads take one each."""
+        """Tiles of a single vertex, for GPUs, where a thread computes one vertex, shape (lanes, 2)."""
         length = self.runs[:, 1]
         run = np.repeat(np.arange(len(length)), length)
         lane = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
@@ -103,7 +104,7 @@ class Runs:
 
 
 def palette(columns: Columns, anchors: Anchors, parameters: Parameters, drivers: Drivers) -> NDArray[np.float32]:
-    """Inputs of a frame in one row, shape (F, columns.width)."""
+    """All pose inputs, one row per frame, shape (F, columns.width)."""
     frames = len(drivers.positions)
     out = np.empty((frames, columns.width), dtype=np.float32)
     out[:, : columns.halfway] = drivers.positions.reshape(frames, -1)
@@ -114,7 +115,7 @@ def palette(columns: Columns, anchors: Anchors, parameters: Parameters, drivers:
 
 
 def pack_runs(rows: Rows, columns: Columns, lanes: int) -> Runs:
-    """Rows of coefficients as :func:`pack` wants them: by the palette column their input begins at."""
+    """Pack rows of coefficients into runs of at least ``lanes`` vertices."""
     place = columns.muscles + np.arange(columns.segments)
     swelling = [_placed(rows.muscles, place, columns.width, rows.heights[:, axis]) for axis in range(3)]
     return pack(_by_palette(rows, columns), swelling, rows.offset.astype(np.float32), columns, lanes)
@@ -130,10 +131,11 @@ def pack(
     """Sort vertices into runs of at least ``lanes`` and lay their coefficients out row by row.
 
     Args:
-        scalar: Coefficients of joints, rotations and scales, shape (V, columns.width).
-        swelling: Muscle vectors, x, y and z apart, likewise.
-        offset: Rest offsets, shape (V, 3).
-        columns: Of the palette.
+        scalar: Coefficients of positions, rotations and scales, by the first palette column of their input, shape
+            (V, columns.width).
+        swelling: x, y and z components of the muscle vectors [m], likewise.
+        offset: Rest offsets [m], shape (V, 3).
+        columns: Layout of the palette.
         lanes: Vertices in a tile.
     """
     used = abs(scalar) + abs(swelling[0]) + abs(swelling[1]) + abs(swelling[2])
@@ -146,7 +148,7 @@ def pack(
     kind = np.searchsorted(columns.kinds, slot, side="right") - 1
     slots_of = np.zeros((count, 4), dtype=np.int64)
     np.add.at(slots_of, (run, kind), 1)
-    # a run holds one row of its length for every slot, but three for offsets and three for a muscle
+    # rows of coefficients of a run: one for every slot, but three for a muscle, and three for offsets
     high = slots_of @ [1, 1, 1, 3] + 3
     first_slot, first_lane = _starts(slots_of.sum(axis=1)), _starts(length)
     first_coefficient = _starts(high * length)
@@ -162,13 +164,13 @@ def pack(
         coefficients[first_coefficient[r] + rows * length[r] + lane_of[at]] = values
 
     for axis, matrix in enumerate((scalar, *swelling)):
-        some = matrix[order].tocoo()
-        stored = some.data != 0.0
-        at, column = some.row[stored], some.col[stored]
-        lay(at, row[run_of[at], column] + max(axis - 1, 0), some.data[stored])
-    everyone = np.arange(len(order))
+        entries = matrix[order].tocoo()
+        stored = entries.data != 0.0
+        at, column = entries.row[stored], entries.col[stored]
+        lay(at, row[run_of[at], column] + max(axis - 1, 0), entries.data[stored])
+    all_lanes = np.arange(len(order))
     for axis in range(3):
-        lay(everyone, slots_of[:, :3].sum(axis=1)[run_of] + axis, offset[order, axis])
+        lay(all_lanes, slots_of[:, :3].sum(axis=1)[run_of] + axis, offset[order, axis])
     tiles = [(r, min(lane, n - lanes)) for r, n in enumerate(length.tolist()) for lane in range(0, n, lanes)]
     table = np.column_stack([first_lane, length, first_coefficient, first_slot, slots_of])
     return Runs(
@@ -182,11 +184,12 @@ def pack(
 
 
 def _starts(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Start of every block of a concatenation, from the blocks' lengths."""
     return np.cumsum(lengths) - lengths
 
 
 def _by_palette(rows: Rows, columns: Columns) -> sp.csr_array:
-    """Coefficients of positions, rotations and scales by the palette column their input begins at, shape (V, width)."""
+    """Coefficients of positions, rotations and scales by the first palette column of their input, shape (V, width)."""
     joints = columns.joints
     parts = (
         (rows.positions, 3 * np.arange(joints)),
@@ -202,9 +205,9 @@ def _by_palette(rows: Rows, columns: Columns) -> sp.csr_array:
 def _placed(
     matrix: sp.csr_array, place: NDArray[np.integer], width: int, factor: NDArray[np.float64] | None
 ) -> sp.csr_array:
-    """A matrix with its columns at other places of a wider one, entries times a factor each."""
+    """A matrix of a larger width with column k moved to ``place[k]``, and entries multiplied by ``factor``."""
     values = matrix.data.copy() if factor is None else matrix.data * factor
-    # what follows changes arrays in place: none of them may be the matrix's own
+    # copies, since the calls below change arrays in place
     out = sp.csr_array((values, place[matrix.indices], matrix.indptr.copy()), shape=(matrix.shape[0], width))
     out.eliminate_zeros()
     out.sort_indices()

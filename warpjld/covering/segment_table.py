@@ -1,4 +1,4 @@
-"""Segments at rest, and the projection of points on them (A §4, R34–R39)."""
+"""Geometry of the segments at rest, and projection of points on them (A §4, R34–R39)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["SNAP", "SegmentTable"]
 
 SNAP = 1e-9
-"""Ratios, and heights relative to the surface's size, that differ by less are equal: what rounding, which differs from
-processor to processor, may not decide."""
+"""Ratios, and heights relative to the surface's size, that differ by less count as equal, so that rounding, which
+differs between processors, decides nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,8 @@ class SegmentTable:
 
     Attributes:
         ends: Proximal and distal joint, shape (S, 2).
-        start: Proximal joint [m], shape (S, 3).
-        along: From there to the distal joint [m], shape (S, 3).
+        start: Position of the proximal joint [m], shape (S, 3).
+        along: Vector from there to the distal joint [m], shape (S, 3).
         normals: Unit y axes at the proximal and distal joint, shape (S, 2, 3) (R20).
         open_end: Whether it ends in an extremity, where the ratio may exceed 1, shape (S,).
         open_start: Whether it begins at a root, where the ratio may fall below 0, shape (S,).
@@ -39,15 +39,15 @@ class SegmentTable:
 
     @staticmethod
     def build(skeleton: Skeleton, ends: NDArray[np.int32]) -> SegmentTable:
-        """Of segments between these joints, shape (S, 2)."""
+        """Table of the segments between these proximal and distal joints, shape (S, 2)."""
         start = skeleton.rest[ends[:, 0]]
         along = skeleton.rest[ends[:, 1]] - start
         direction = unit(along)
         normals = np.stack([np.cross(direction, skeleton.axes[ends[:, k]]) for k in (0, 1)], axis=1)
         lengths = np.linalg.norm(normals, axis=2, keepdims=True)
-        # an axis along the segment says nothing of its sides: take the other end's, or any normal
+        # a flexion axis along the segment gives no normal: use the other end's, or any perpendicular
         normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), normals[:, ::-1])
-        # of two axes equally far from the segment the first, however the last digits fall
+        # rounded, so that of two coordinate axes equally far from the segment the first is taken
         fallback = np.cross(direction, np.eye(3)[np.abs(direction).round(6).argmin(axis=1)])
         lengths = np.linalg.norm(normals, axis=2, keepdims=True)
         normals = np.where(lengths > 1e-3, normals / np.maximum(lengths, 1e-30), fallback[:, None, :])
@@ -63,10 +63,10 @@ class SegmentTable:
         return np.where((t > 1.0) & ~self.open_end, 1.0, t)
 
     def heights(self, points: NDArray[np.float64], segments: NDArray[np.integer]) -> NDArray[np.float64]:
-        """y part of the offset of each point from a segment: (offset · normal) normal [m], shape (n, 3) (R63).
+        """Height vector of each point over a segment, (offset · normal) normal [m], shape (n, 3) (R63).
 
-        With the normals of both joints, blended along the segment: hip and knee bend in opposite senses, and half-way
-        along a thigh an interpolated normal would vanish and turn over.
+        It is evaluated with the normal of each joint, and the results are interpolated: hip and knee bend in opposite
+        senses, and half-way along a thigh an interpolated normal would vanish and flip.
         """
         along, start, normals = self.along[segments], self.start[segments], self.normals[segments]
         offset = points - start

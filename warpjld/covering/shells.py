@@ -1,7 +1,8 @@
-"""Shells of a surface that lie on others: nails, eyelashes, buttons and clothes follow the skin under them.
+"""Connected components (shells) of a surface, and the transfer of fields from the skin to shells that lie on it.
 
-Heat runs along a surface, so whatever is not joined to the skin would find its own way at a joint and part from it.
-Each coefficient of such a shell is therefore read from the host below: ``fields = shells(...).follow @ fields``.
+Fields are diffused along the surface, so those of nails, eyelashes, buttons and clothes would differ from the skin's
+beneath, and part from it at joints. Their coefficients are therefore interpolated on the skin, their host:
+``fields = shells(...).follow @ fields``.
 """
 
 from __future__ import annotations
@@ -20,32 +21,31 @@ from warpjld.geometry.rotations import unit
 
 __all__ = ["Shells", "shell_numbers", "shells"]
 
-_SAMPLES = 16  # places on a segment, and
-_RAYS = 8  # rays from each of them around it, that ask which shell its flesh is
-_OWN = 0.5  # share of a segment's length in a shell that makes it a host: an eyeball on its bone's end has less; or
-_ACROSS = 0.25  # of the shell's own width in segments that go on: balls of a mannequin hide much of what lies between
-_SMALL = 1.5  # a shell that reaches no further from its middle than so many host thicknesses stays rigid
-_PLACES = 16  # of a small shell, whose mean says what it follows
-_SEAM = 1e-6  # of the surface's size: borders nearer than this are one border
-_FURTHER = 0.5  # host thicknesses that a shell may stand off so that it faces the same way as its host
+_SAMPLES = 16  # points on a segment from which rays are cast
+_RAYS = 8  # rays around the segment from each of them, to find the shell that surrounds it
+_OWN = 0.5  # share of a segment's length inside a shell that makes it a host (an eyeball at its bone's end has less)
+_ACROSS = 0.25  # length of continued segments inside a shell, relative to its width, that does too (mannequins)
+_SMALL = 1.5  # radius of a shell, in units of the host's thickness, up to which it moves rigidly
+_PLACES = 16  # points of a small shell over which its rows are averaged
+_SEAM = 1e-6  # relative to the surface's size: border vertices nearer than this coincide
+_FURTHER = 0.5  # additional distance, in host thicknesses, allowed to a host face of the same orientation
 
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """Connected shells of a surface, and what the lying ones follow.
+    """Connected components of a surface, and the map of fields from hosts to shells that lie on them.
 
     Attributes:
         label: Shell of every vertex, shape (V,), numbered from 0; vertices without a face are shells of their own.
         host: Whether a shell is flesh around segments, shape (N,).
-        lies: Whether a shell follows a host, shape (N,): neither host nor rigid nor without faces.
-        whole: Whether a lying shell is small against what it lies on, with no border vertex on it, and follows as one,
-            shape (N,). All rows of
-            ``follow`` of such a shell are equal: with equal positions and rotations, and no rounding or muscle, it
-            moves rigidly.
-        follow: Sparse (V, V), rows non-negative and summing to one: fields X of the hosts make ``follow @ X`` those of
-            the whole surface. Rows of hosts and of what is rigid are the identity's, but where borders of several
-            hosts coincide the mean of those vertices.
-        distance: How far a vertex of a lying shell is from its host [m], 0 elsewhere, shape (V,).
+        lies: Whether a shell lies on a host, shape (N,): neither host nor rigid nor without faces.
+        whole: Whether a lying shell moves rigidly, shape (N,): it is small compared with the host's thickness, and no
+            border vertex lies on the host. All its rows of ``follow`` are equal, so with equal positions and
+            rotations, and no rounding or muscle, it moves rigidly.
+        follow: Interpolation weights, sparse (V, V), rows non-negative and summing to one: ``follow @ X`` are fields of
+            the whole surface for fields X of the hosts. Rows of hosts and rigid vertices are the identity's, except
+            that coincident border vertices of hosts get their mean.
+        distance: Distance of a vertex of a lying shell from its host [m], 0 elsewhere, shape (V,).
     """
 
     label: NDArray[np.int32]
@@ -62,16 +62,16 @@ def shells(
     lines: NDArray[np.float64],
     rigid: NDArray[np.int32] | None = None,
 ) -> Shells:
-    """Find the shells of a surface, and what each lies on.
+    """Find the shells of a surface, and the host that each lies on.
 
-    Hosts are the shells that segments run through: seen from a segment, such a one is the first all round. Clothes are
-    not while there is skin inside them, however large; where there is none they are.
+    Hosts are the shells that segments run through: most rays from a segment hit them first. Clothes, however large, are
+    hosts only where there is no skin inside them.
 
     Args:
         vertices: Rest surface, welded [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
         lines: Ends of all segments at rest [m], shape (S, 2, 3).
-        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); all is flesh by default.
+        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (V,); by default all vertices are flesh.
     """
     count = len(vertices)
     flesh = np.ones(count, dtype=bool) if rigid is None else rigid < 0
@@ -80,25 +80,25 @@ def shells(
     seams = _seams(vertices, faces, flesh)
     label = shell_numbers(faces, count, seams)
     number = int(label.max()) + 1
-    soft = np.bincount(label, flesh & used, number) > 0
-    host, lies = soft, np.zeros(number, dtype=bool)
+    is_flesh = np.bincount(label, flesh & used, number) > 0
+    host, lies = is_flesh, np.zeros(number, dtype=bool)
     whole = lies.copy()
     identity = sp.eye_array(count, format="csr")
     distance = np.zeros(count)
-    if soft.sum() > 1:
-        host = _hosts(vertices, faces, lines, label, soft)
-        lies = soft & ~host
-    follow = _joined(seams, count) if len(seams) else identity
+    if is_flesh.sum() > 1:
+        host = _hosts(vertices, faces, lines, label, is_flesh)
+        lies = is_flesh & ~host
+    follow = _averaged_seams(seams, count) if len(seams) else identity
     if lies.any():
         rows, distance, whole = _follow(vertices, faces, lines, label, host, lies, flesh)
-        # rows of a shell that lies come from hosts; host borders that coincide are means already
+        # rows of lying shells are composed with those of hosts, whose coincident borders are averaged already
         free = sp.diags_array((~(lies[label] & flesh)).astype(np.float64))
         follow = sp.csr_array(free @ follow + rows @ follow)
     return Shells(label, host, lies, whole, follow, distance)
 
 
 def shell_numbers(faces: NDArray[np.int32], count: int, seams: NDArray[np.int64] | None = None) -> NDArray[np.int32]:
-    """Number of the connected shell of every vertex, shape (V,); ``seams`` join pairs of vertices, shape (n, 2)."""
+    """Connected component of every vertex, shape (V,); ``seams`` are additional edges, shape (n, 2)."""
     links = np.concatenate([faces[:, :2], faces[:, 1:], *([] if seams is None else [seams])])
     graph = sp.coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
     label: NDArray[np.int32] = connected_components(graph, directed=False)[1]
@@ -106,7 +106,7 @@ def shell_numbers(faces: NDArray[np.int32], count: int, seams: NDArray[np.int64]
 
 
 def _border(faces: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Vertices on edges of one face only."""
+    """Boundary vertices: those on edges of a single face."""
     half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     half.sort(axis=1)
     base = int(faces.max()) + 1
@@ -115,7 +115,7 @@ def _border(faces: NDArray[np.int32]) -> NDArray[np.int64]:
 
 
 def _seams(vertices: NDArray[np.float64], faces: NDArray[np.int32], flesh: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Pairs of border vertices of flesh at one place, as where a body is drawn as several meshes, shape (n, 2)."""
+    """Pairs of coincident boundary vertices of flesh, as where a body consists of several meshes, shape (n, 2)."""
     border = _border(faces)
     border = border[flesh[border]]
     size = float(np.linalg.norm(np.ptp(vertices[faces.ravel()], axis=0)))
@@ -124,8 +124,8 @@ def _seams(vertices: NDArray[np.float64], faces: NDArray[np.int32], flesh: NDArr
     return border[cKDTree(vertices[border]).query_pairs(_SEAM * size, output_type="ndarray")].reshape(-1, 2)
 
 
-def _joined(seams: NDArray[np.int64], count: int) -> sp.csr_array:
-    """Mean over vertices that are one place, for all others the identity, shape (V, V)."""
+def _averaged_seams(seams: NDArray[np.int64], count: int) -> sp.csr_array:
+    """Matrix that averages over coincident vertices, and is the identity for all others, shape (V, V)."""
     links = sp.coo_array((np.ones(len(seams)), (seams[:, 0], seams[:, 1])), shape=(count, count))
     group = connected_components(links, directed=False)[1]
     member = sp.csr_array((np.ones(count), (np.arange(count), group)))
@@ -137,13 +137,13 @@ def _hosts(
     faces: NDArray[np.int32],
     lines: NDArray[np.float64],
     label: NDArray[np.int32],
-    soft: NDArray[np.bool_],
+    is_flesh: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Shells of flesh that are first all round a segment, the largest where none is, shape (N,)."""
+    """Shells of flesh that surround a segment, or the one of the largest area where none does, shape (N,)."""
     import warp as wp
     from warpjld_kernels.shells import first_face_met
 
-    number = len(soft)
+    number = len(is_flesh)
     of_face = label[faces[:, 0]]
     share = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     along = lines[:, 1] - lines[:, 0]
@@ -151,10 +151,10 @@ def _hosts(
     forward = unit(along)
     across = unit(np.cross(forward, np.eye(3)[np.abs(forward).round(6).argmin(axis=1)]))
     angle = (np.arange(_RAYS) + 0.3) * (2.0 * np.pi / _RAYS)
-    ways = np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(forward, across)[:, None]
+    radial = np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(forward, across)[:, None]
     shape = (len(lines), _SAMPLES, _RAYS, 3)
     starts = np.broadcast_to(origins[:, :, None], shape).reshape(-1, 3)
-    directions = np.broadcast_to(ways[:, None], shape).reshape(-1, 3)
+    directions = np.broadcast_to(radial[:, None], shape).reshape(-1, 3)
     mesh, centre = _mesh(vertices, faces)
     met = wp.empty(len(starts), dtype=wp.int32, device="cpu")
     rays = [wp.array((starts - centre).astype(np.float32), dtype=wp.vec3, device="cpu")]
@@ -166,7 +166,7 @@ def _hosts(
     votes = sp.coo_array(
         (np.ones(hit.sum()), (sample[hit], of_face[face[hit]])), shape=(len(lines) * _SAMPLES, number)
     ).tocsr()
-    # the flesh of a place on a segment is what most rays meet first
+    # a point of a segment lies inside the shell that most of its rays hit first
     inside = sp.csr_array(votes > _RAYS // 2).astype(np.float64)
     segment = sp.kron(sp.eye_array(len(lines)), np.full((1, _SAMPLES), 1.0 / _SAMPLES)).tocsr()
     shares = segment @ inside
@@ -174,11 +174,11 @@ def _hosts(
     length = shares.T @ (np.linalg.norm(along, axis=1) * goes_on)
     width = np.array([_spread(vertices, label, number, k) for k in range(3)]).max(axis=0)
     owned = shares.max(axis=0).toarray().ravel() >= _OWN
-    host: NDArray[np.bool_] = soft & (owned | (length >= _ACROSS * np.maximum(width, 1e-30)))
-    if not host.any():  # a skeleton outside its surface
+    host: NDArray[np.bool_] = is_flesh & (owned | (length >= _ACROSS * np.maximum(width, 1e-30)))
+    if not host.any():  # the skeleton lies outside its surface
         edges = [vertices[faces[:, k]] - vertices[faces[:, 0]] for k in (1, 2)]
         area = np.bincount(of_face, np.linalg.norm(np.cross(edges[0], edges[1]), axis=1), number)
-        host[np.argmax(np.where(soft, area, -1.0))] = True
+        host[np.argmax(np.where(is_flesh, area, -1.0))] = True
     return host
 
 
@@ -199,18 +199,18 @@ def _follow(
     lies: NDArray[np.bool_],
     flesh: NDArray[np.bool_],
 ) -> tuple[sp.csr_array, NDArray[np.float64], NDArray[np.bool_]]:
-    """Rows of lying vertices over those of hosts, shape (V, V), distances (V,), and whole shells (N,)."""
+    """Interpolation weights of lying vertices on hosts (V, V), distances [m] (V,), and which shells are rigid (N,)."""
     count, number = len(vertices), len(host)
     on = faces[(host[label] & flesh)[faces].all(axis=1)]
-    some = np.flatnonzero(lies[label] & flesh)
-    of = label[some]
+    lying = np.flatnonzero(lies[label] & flesh)
+    of = label[lying]
     below = _mesh(vertices, on)
-    place, face, weights, apart = _nearest(vertices, on, below, some, np.zeros((len(some), 3)), np.zeros(len(some)))
+    place, face, weights, apart = _nearest(vertices, on, below, lying, np.zeros((len(lying), 3)), np.zeros(len(lying)))
     thick = _line_distance(place, lines)
 
-    # where a shell faces the skin it lies on, it may not stick to a neighbour's; one with an inner side, or one
-    # drawn inside out, is asked accordingly
-    normals = vertex_normals(vertices, faces).astype(np.float64)[some]
+    # an open shell is matched only to host faces of its own orientation, so that it does not stick to a neighbouring
+    # finger; the sign of the mean says whether it is inside out. Closed shells have both orientations: no restriction
+    normals = vertex_normals(vertices, faces).astype(np.float64)[lying]
     corner = vertices[on[face]]
     towards = unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
     sense = np.sign(np.bincount(of, (normals * towards).sum(axis=1), number))
@@ -218,35 +218,36 @@ def _follow(
     border[_border(faces)] = True
     sheet = np.bincount(label, border, number) > 0
     normals = normals * (sense * sheet)[of][:, None]
-    place, face, weights, apart = _nearest(vertices, on, below, some, normals, _FURTHER * thick)
+    place, face, weights, apart = _nearest(vertices, on, below, lying, normals, _FURTHER * thick)
 
-    mean = sp.csr_array((np.ones(len(some)), (of, np.arange(len(some)))), shape=(number, len(some)))
+    mean = sp.csr_array((np.ones(len(lying)), (of, np.arange(len(lying)))), shape=(number, len(lying)))
     size = np.maximum(mean.sum(axis=1), 1.0)
-    middle = (mean @ vertices[some]) / size[:, None]
+    middle = (mean @ vertices[lying]) / size[:, None]
     reach = np.zeros(number)
-    np.maximum.at(reach, of, np.linalg.norm(vertices[some] - middle[of], axis=1))
+    np.maximum.at(reach, of, np.linalg.norm(vertices[lying] - middle[of], axis=1))
     whole = lies & (reach <= _SMALL * (mean @ thick) / size)
-    # whose border is sewn to the skin bends with it, or it would tear off
-    sewn = border[some] & (apart < _SEAM * float(np.linalg.norm(np.ptp(vertices[faces.ravel()], axis=0))))
+    # shells with border vertices on the skin bend with it, so that they do not tear off
+    sewn = border[lying] & (apart < _SEAM * float(np.linalg.norm(np.ptp(vertices[faces.ravel()], axis=0))))
     whole[of[sewn]] = False
 
-    rows = sp.csr_array((weights.ravel(), on[face].ravel(), np.arange(len(some) + 1) * 3), shape=(len(some), count))
-    # one row of a small shell for all of it: mean of a few of its vertices far apart, each for those around it
+    rows = sp.csr_array((weights.ravel(), on[face].ravel(), np.arange(len(lying) + 1) * 3), shape=(len(lying), count))
+    # a common row for all vertices of a small shell: the mean of those of a few distant vertices, weighted by how many
+    # vertices are nearest to each
     small = np.flatnonzero(whole[of])
     if small.size:
-        chosen = small[_far_apart(vertices[some[small]], of[small], middle)]
-        pick = sp.csr_array((np.ones(len(small)), (of[small], chosen)), shape=(number, len(some)))
+        chosen = small[_far_apart(vertices[lying[small]], of[small], middle)]
+        pick = sp.csr_array((np.ones(len(small)), (of[small], chosen)), shape=(number, len(lying)))
         common = sp.diags_array(1.0 / np.maximum(pick.sum(axis=1), 1.0)) @ (pick @ rows)
-        spread = sp.csr_array((np.ones(len(small)), (small, of[small])), shape=(len(some), number))
+        spread = sp.csr_array((np.ones(len(small)), (small, of[small])), shape=(len(lying), number))
         rows = sp.diags_array((~whole[of]).astype(np.float64)) @ rows + spread @ common
-    placed = sp.csr_array((np.ones(len(some)), (some, np.arange(len(some)))), shape=(count, len(some)))
+    placed = sp.csr_array((np.ones(len(lying)), (lying, np.arange(len(lying)))), shape=(count, len(lying)))
     distance = np.zeros(count)
-    distance[some] = apart
+    distance[lying] = apart
     return sp.csr_array(placed @ rows), distance, whole
 
 
 def _far_apart(points: NDArray[np.float64], of: NDArray[np.int32], middle: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The chosen point that stands for each point, shape (n,): some of its shell, each as far as can be from others."""
+    """Nearest sample of each point, shape (n,), by farthest-point sampling of ``_PLACES`` points in every shell."""
     stands = np.zeros(len(points), dtype=np.int64)
     reach = np.linalg.norm(points - middle[of], axis=1)
     last = np.zeros(len(middle), dtype=np.int64)
@@ -264,18 +265,27 @@ def _nearest(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
     below: tuple[Any, NDArray[np.float64]],
-    some: NDArray[np.int64],
+    lying: NDArray[np.int64],
     normals: NDArray[np.float64],
     further: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """Nearest place on ``faces``, which ``below`` holds, of some vertices: it (n, 3), face (n,), weights (n, 3),
-    distance (n,)."""
+    """Closest points on ``faces`` of some vertices: points [m] (n, 3), faces (n,), barycentric weights (n, 3), and
+    distances [m] (n,).
+
+    Args:
+        vertices: Positions [m], shape (V, 3).
+        faces: Triangles of the hosts, shape (T, 3).
+        below: Their mesh, from :func:`_mesh`.
+        lying: Indices of the vertices, shape (n,).
+        normals: Their normals, which faces must agree with; zero where any face will do, shape (n, 3).
+        further: Additional distance allowed to a face that agrees [m], shape (n,).
+    """
     import warp as wp
     from warpjld_kernels.shells import nearest_facing
 
     mesh, centre = below
-    count = len(some)
-    inputs = [wp.array(a.astype(np.float32), dtype=wp.vec3, device="cpu") for a in (vertices[some] - centre, normals)]
+    count = len(lying)
+    inputs = [wp.array(a.astype(np.float32), dtype=wp.vec3, device="cpu") for a in (vertices[lying] - centre, normals)]
     inputs.append(wp.array(further.astype(np.float32), dtype=float, device="cpu"))
     kinds = (wp.int32, wp.vec3, float)
     out = [wp.empty(count, dtype=kind, device="cpu") for kind in kinds]
@@ -288,7 +298,8 @@ def _nearest(
 
 
 def _mesh(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[Any, NDArray[np.float64]]:
-    """A mesh to ask, about its own middle: far from the origin float32 would cost digits."""
+    """A Warp mesh for queries, relative to the mean of its vertices (float32 loses digits far from the origin), and
+    that mean [m]."""
     import warp as wp
 
     centre = vertices[faces.ravel()].mean(axis=0)

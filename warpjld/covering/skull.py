@@ -1,9 +1,9 @@
-"""The skull: a head is bone all over, and turns as a whole.
+"""Additional lines of the head's domain: a skull turns rigidly, and reaches further than its one segment.
 
-Its one segment, from where the head turns to its crown, says neither how far the head reaches forward and down nor that
-nothing of it rounds: a jaw lies nearer to the neck's segments than to its own, and beside a joint a vertex would turn
-by half (C22). So the head's fan also holds what lies about lines to the face, the ears and the back of the head, and is
-stiff: inside it all turns with the bone, and the neck takes over where domains blend.
+The head's segment, from the head joint to the crown, tells neither how far the head extends forward and down nor that
+it does not bend: a jaw lies nearer to the neck's segments than to the head's, and near a joint a vertex would turn by
+half (C22). So the head's fan also heats the surface from lines to the face, the ears and the back of the head, and is
+stiff: its domain turns rigidly with the bone, and is blended with the neck's at the border.
 """
 
 from __future__ import annotations
@@ -21,17 +21,15 @@ __all__ = ["CROWN", "skull_lines"]
 CROWN = "head.top"
 """The joint at which the skull's segment ends."""
 
-_FACE = (
-    0.75  # of the way from where the head turns to nose, chin, ears and the back of the head: bone ends below the skin
-)
-_RISE = 0.5  # slope of the lines to ears and back: below them a neck begins
-_REACH = 6.0  # crowns' heights: what lies further off is no head
+_FACE = 0.75  # length of the lines relative to the distance of the skin, since bone ends below it
+_RISE = 0.5  # upward slope of the lines to ears and back, which keeps them above the neck
+_REACH = 6.0  # in units of the crown's height: hits further away do not belong to the head
 
 
 def skull_lines(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Lines inside a body's head besides its segment, as pairs of ends [m]; none where the skeleton has no head.
+    """Lines inside a body's head in addition to its segment, as pairs of ends [m]; none where the skeleton has no head.
 
     Args:
         skeleton: The rest skeleton.
@@ -46,7 +44,7 @@ def skull_lines(
     ends = list(dict(face_points(joints, vertices, up, forward)).values())
     height = float(np.linalg.norm(joints[CROWN] - base))
     left = np.cross(up, forward)
-    ways = unit(np.array([-forward, left, -left]) + _RISE * up)
-    reach = first_hits(vertices, nearby(vertices, faces, base, _REACH * height), np.tile(base, (3, 1)), ways)
-    ends += [base + length * way for length, way in zip(reach, ways, strict=True) if length < _REACH * height]
+    directions = unit(np.array([-forward, left, -left]) + _RISE * up)
+    reach = first_hits(vertices, nearby(vertices, faces, base, _REACH * height), np.tile(base, (3, 1)), directions)
+    ends += [base + length * way for length, way in zip(reach, directions, strict=True) if length < _REACH * height]
     return [(base, base + _FACE * (end - base)) for end in ends]

@@ -1,4 +1,4 @@
-"""Bind a surface to a skeleton: domains found, and every vertex placed on its segments (A §4)."""
+"""Binding of a surface to a skeleton: domains of the operators, then coordinates of every vertex (A §4)."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ def bind(
     domains: Literal["geometry", "skin"] | NDArray[np.float64] = "geometry",
     method: Literal["smooth", "paper"] = "smooth",
 ) -> Covering:
-    """Bind a surface to a skeleton (A §4): find domains and place every vertex on its segments.
+    """Bind a surface to a skeleton (A §4): find domains, and the coordinates of every vertex on its segments.
 
     Args:
         skeleton: The rest skeleton.
         surface: The rest surface, in the skeleton's frame.
-        parameters: The animator's parameters; by default those that keep volume.
-        skin: Painted weights, wanted by ``domains="skin"``.
-        rigid: Joint that a vertex without flesh follows with its bone, -1 for flesh, shape (V,). What is rigid takes no
-            part in domains: eyes in a head neither hide bones from its skin nor heat it.
+        parameters: The animator's parameters; by default :func:`default_parameters`.
+        skin: Painted weights, needed by ``domains="skin"``.
+        rigid: Joint whose bone a rigid vertex follows, -1 for flesh, shape (V,). Rigid faces are left out of bone heat:
+            eyes in a head neither hide bones from its skin nor conduct heat.
         domains: "geometry" (bone heat), "skin" (painted weights), or weights of every operator, shape (V, fans).
-        method: "smooth" (soft borders, rotations) or "paper" (its own hard-edged operators, to compare).
+        method: "smooth" (soft borders, rotations) or "paper" (the operators as published, with hard borders).
 
     Raises:
         InputError: A skeleton without segments, missing painted weights, or parameters out of range.
@@ -50,10 +50,10 @@ def bind(
         raise InputError(f"method: want 'smooth' or 'paper', got {method!r}")
     groups = fans(skeleton)
     if not groups:
-        raise InputError("skeleton: it has no segment to cover")
+        raise InputError("skeleton: want at least one segment, got none")
     chosen = default_parameters(skeleton) if parameters is None else parameters
     chosen.check(skeleton)
-    hard = _checked_rigid(rigid, len(surface.vertices), len(skeleton))
+    checked = _checked_rigid(rigid, len(surface.vertices), len(skeleton))
     if isinstance(domains, np.ndarray):
         weights = domains
     elif domains not in ("geometry", "skin"):
@@ -61,17 +61,17 @@ def bind(
     elif domains == "skin" and skin is None:
         raise InputError("domains 'skin': this rig has no painted weights")
     else:
-        weights = domains_of_rigid(hard, skeleton, groups)
-        if (flesh := np.flatnonzero(hard < 0)).size:
+        weights = domains_of_rigid(checked, skeleton, groups)
+        if (flesh := np.flatnonzero(checked < 0)).size:
             vertices, faces = part_of_surface(surface.vertices, surface.faces, flesh)
             if domains == "geometry" or skin is None:
                 weights[flesh] = domains_from_geometry(vertices, faces, skeleton, groups)
             else:
                 painted = Skin(skin.joints[flesh], skin.weights[flesh])
                 weights[flesh] = domains_from_skin(vertices, faces, skeleton, groups, painted)
-    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen, rigid=hard)
+    anchors = anchor(surface.vertices, skeleton, groups, weights, chosen, rigid=checked)
     if method == "paper":
-        from warpjld.covering.paper import PaperCovering  # SciPy with it, which a kept binding does without
+        from warpjld.covering.paper import PaperCovering  # imports SciPy, which a stored binding does not need
 
         return PaperCovering(skeleton, surface, chosen, groups, weights, anchors)
     return Covering(skeleton, surface, chosen, groups, weights, anchors)
@@ -85,14 +85,14 @@ def bind_rig(
     domains: Literal["geometry", "skin"] = "geometry",
     method: Literal["smooth", "paper"] = "smooth",
 ) -> Covering:
-    """Bind a rig's surface to its skeleton (A §4), with what the rig knows: its painted weights, what of it is rigid.
+    """Bind a rig's surface to its skeleton (A §4), with the rig's painted weights and rigid vertices.
 
     Args:
         rig: The rig.
-        skeleton: In place of the rig's own, where limits were changed.
-        parameters: The animator's parameters; by default those that keep volume.
+        skeleton: Skeleton to use instead of the rig's own, for example with other limits.
+        parameters: The animator's parameters; by default :func:`default_parameters`.
         domains: "geometry" (bone heat), or "skin" for the rig's painted weights.
-        method: "smooth" (soft borders, rotations) or "paper" (its own hard-edged operators, to compare).
+        method: "smooth" (soft borders, rotations) or "paper" (the operators as published, with hard borders).
 
     Raises:
         InputError: A skeleton without segments, missing painted weights, or parameters out of range.
@@ -114,10 +114,11 @@ def bind_rig(
 
 
 def _checked_rigid(rigid: NDArray[np.int32] | None, vertices: int, joints: int) -> NDArray[np.int32]:
+    """``rigid`` as int32, shape (V,), all flesh by default; InputError for a wrong shape or a joint out of range."""
     if rigid is None:
         return np.full(vertices, -1, dtype=np.int32)
     if rigid.shape != (vertices,):
         raise InputError(f"rigid: want a joint for each of {vertices} vertices, got shape {rigid.shape}")
     if rigid.min(initial=-1) < -1 or rigid.max(initial=-1) >= joints:
-        raise InputError(f"rigid: joints must lie in -1…{joints - 1}")
+        raise InputError(f"rigid: joints must lie in -1…{joints - 1}, got {rigid.min()}…{rigid.max()}")
     return np.asarray(rigid, dtype=np.int32)

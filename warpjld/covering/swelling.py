@@ -1,14 +1,13 @@
-"""How much the flesh around a joint swells when it bends, so that a surface keeps its volume whatever its shape is.
+"""Swelling amplitudes of the joints, fitted at binding so that flexing a joint preserves the volume of the surface.
 
-A tube that bends about its middle keeps its volume but for a few hundredths. Flesh does not lie around its
-joints as a tube: where a joint lies near the outer side, most of the flesh is on the inside of the bend, and the wedge
-that closes there is larger than the one that opens outside; a thumb's ball or a buttock has no counterpart at all.
-What is lost is measured at binding, joint by joint, and put back over both its segments, outside and at the sides, as
-flesh that is pushed away finds room where there is some: in one place it would be a lump, and inside the bend it would
-only be folded in again.
+A tube that bends about its axis keeps its volume but for a few hundredths. Flesh does not surround its joints as a
+tube: where a joint lies near the outer side, most of the flesh is on the inside of the bend, and the wedge that closes
+there is larger than the one that opens outside; the ball of a thumb or a buttock has no counterpart at all. The lost
+volume is measured at binding, joint by joint, and restored over both adjacent segments, on the outside and the flanks:
+in one place it would be a lump, and inside the bend it would be folded in again.
 
-Flexing one joint moves what lies beyond it as a rigid body about the joint, so with the joint as the origin only faces
-that bend or grow change the sum Σ a · (b × c) / 6.
+Flexing one joint moves everything beyond it as a rigid body about the joint, so with the joint as the origin only faces
+that deform change the sum Σ a · (b × c) / 6.
 """
 
 from __future__ import annotations
@@ -39,19 +38,20 @@ else:
 
 __all__ = ["volume_keeping"]
 
-# of the largest flexion: what is lost grows faster than the flexion ratio, what swells as it does
+# fractions of the largest flexion that are measured; the loss grows faster than the flexion ratio, the swelling in
+# proportion to it
 _PARTS = (0.33, 0.67, 1.0)
-_WIDEST = np.radians(110.0)  # of what is measured: beyond, limbs lie on one another
-_MOST = 0.8  # amplitude at which it ends
+_WIDEST = np.radians(110.0)  # largest flexion that is measured: beyond, limbs touch each other
+_MOST = 0.8  # upper bound of the amplitudes
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _ABDUCTION = CHANNELS.index("abduction")
 
 
 def volume_keeping(covering: Covering) -> NDArray[np.float64]:
-    """Amplitudes of swelling with which single flexed joints keep the volume of the flesh, shape (J,).
+    """Swelling amplitudes with which flexing a single joint preserves the volume of the flesh, shape (J,).
 
-    Between 0 and 4/5: a joint whose flesh gains volume is left alone, and where next to none lies outside the joint it
-    does not grow without end.
+    They lie between 0 and 4/5: a joint whose flesh gains volume gets 0, and the upper bound applies where hardly any
+    flesh lies on the outside of a joint.
     """
     skeleton = covering.skeleton
     largest = np.minimum(skeleton.limits[:, FLEXION, 1], _WIDEST)
@@ -79,8 +79,8 @@ def volume_keeping(covering: Covering) -> NDArray[np.float64]:
 
 
 def _measured(skeleton: Skeleton, joint: int, largest: float) -> NDArray[np.float64]:
-    """Angles of the poses that one joint is measured in, shape (F, J, channels): flexed; and where it goes further to
-    its sides than it flexes, as a thumb does, with both at once."""
+    """Angles of the poses in which one joint is measured, shape (F, J, channels): flexed, and where its abduction
+    exceeds its flexion, as at a thumb's root, also abducted to either side."""
     angles = np.repeat(skeleton.initial[None], len(_PARTS), axis=0)
     angles[:, joint, FLEXION] = largest * np.array(_PARTS)
     sideways = skeleton.limits[joint, _ABDUCTION]
@@ -92,7 +92,7 @@ def _measured(skeleton: Skeleton, joint: int, largest: float) -> NDArray[np.floa
 
 
 class _Bending:
-    """A surface of which any joint may be flexed."""
+    """A closed surface, from which the part that one joint deforms can be extracted."""
 
     def __init__(self, covering: Covering, rows: Rows) -> None:
         self._rows = rows
@@ -100,7 +100,7 @@ class _Bending:
         self._rest, self._ends = covering.surface.vertices, covering.anchors.ends
         count = len(self._rest)
         boundary, loop = closing_fans(covering.flesh.faces)
-        fans = np.column_stack([boundary[:, ::-1], count + loop])  # around the mean of each open rim
+        fans = np.column_stack([boundary[:, ::-1], count + loop])  # closes each open rim with a fan around its mean
         self._faces = np.concatenate([covering.flesh.faces.astype(np.int64), fans])
         rims = int(loop.max(initial=-1)) + 1
         share = 1.0 / np.maximum(np.bincount(loop, minlength=rims), 1)[loop]
@@ -108,7 +108,7 @@ class _Bending:
         self._corners = sp.vstack([sp.eye_array(count, format="csr"), mean], format="csr")
 
     def around(self, joint: int) -> _Part | None:
-        """Faces that bend or grow with a joint; None where there are none."""
+        """The part of the surface whose faces deform when a joint is flexed; None where there is none."""
         skeleton, rows, joints = self._skeleton, self._rows, len(self._skeleton)
         beyond = np.zeros(joints)
         beyond[joint] = 1.0
@@ -133,38 +133,47 @@ class _Bending:
         number = np.zeros(len(bends), dtype=np.int64)
         number[used] = np.arange(len(used))
         corners = self._corners[used]
-        some = np.unique(corners.indices)
-        swelling = self._swellings[:, [joint]].toarray().ravel()[some]
+        vertices = np.unique(corners.indices)
+        swelling = self._swellings[:, [joint]].toarray().ravel()[vertices]
         initial = initial_ratio(skeleton)
-        grown = 1.0 + rows.scales[some][:, : len(initial)] @ initial
-        entries = np.repeat(np.isin(np.arange(len(self._rest)), some), np.diff(rows.muscles.indptr))
+        grown = 1.0 + rows.scales[vertices][:, : len(initial)] @ initial
+        entries = np.repeat(np.isin(np.arange(len(self._rest)), vertices), np.diff(rows.muscles.indptr))
         return _Part(
             skeleton.rest[joint],
-            self._rest[some],
+            self._rest[vertices],
             number[faces],
-            corners[:, some],
+            corners[:, vertices],
             swelling,
             initial[joint] * swelling / grown,
             Rows(
-                rows.positions[some],
-                rows.turns[some],
-                rows.scales[some],
-                rows.muscles[some],
+                rows.positions[vertices],
+                rows.turns[vertices],
+                rows.scales[vertices],
+                rows.muscles[vertices],
                 rows.heights[entries],
-                rows.offset[some],
+                rows.offset[vertices],
             ),
         )
 
 
 _Line = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-"""A frame: what does not grow, the offsets as they inflate without swelling, and what they swell by for an amplitude of
-1, shapes (n, 3)."""
+"""Positions of a frame as a function of the amplitude [m]: the part without inflation, the offsets inflated without
+swelling, and the swelling at amplitude 1, shapes (n, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What changes its shape with one joint: n vertices, which ``corners`` turns into those of faces, and the field of
-    the swelling, alone and times the flexion ratio at rest, as a part of what else inflates there."""
+    """The part of a surface that one joint deforms, n vertices.
+
+    Attributes:
+        pivot: Rest position of the joint [m], shape (3,).
+        rest: Rest positions [m], shape (n, 3).
+        faces: Triangles over the rows of ``corners``, shape (T, 3).
+        corners: Sparse map from the n vertices to the corners of faces, which include the means of open rims.
+        swelling: The joint's swelling field, shape (n,).
+        at_rest: Swelling field times the joint's flexion ratio at rest, relative to all other inflation, shape (n,).
+        rows: Coefficients of the n vertices.
+    """
 
     pivot: NDArray[np.float64]
     rest: NDArray[np.float64]
@@ -181,7 +190,14 @@ class _Part:
         scalars: NDArray[np.float64],
         ratio: NDArray[np.float64],
     ) -> float:
-        """The one that leaves the least error of volume, by squares over frames of which inputs are given."""
+        """Swelling amplitude of the least squared volume error over F frames (Gauss–Newton).
+
+        Args:
+            positions: Joint positions [m], shape (F, J, 3).
+            turns: Halfway rotations and bones' rotations, shape (F, 2 J, 4).
+            scalars: From ``scalar_inputs``, shape (F, inputs).
+            ratio: Flexion ratio of the joint, shape (F,).
+        """
         rows, before = self.rows, self._volume(self.rest - self.pivot)
         lines: list[_Line] = []
         for k in range(len(ratio)):
@@ -194,7 +210,8 @@ class _Part:
             base = rows.positions @ positions[k] - self.pivot + rotate(turn, np.stack(muscle, axis=1))
             lines.append((base, grown * out, (ratio[k] * self.swelling)[:, None] * out))
         gained = self._volumes(lines, 0.0) - before
-        # to one side a thumb may gain what it loses to the other: that is not made up for
+        # only directions of motion that lose volume are fitted: a thumb may gain volume to one side and lose it to the
+        # other
         loses = gained.reshape(-1, len(_PARTS)).sum(axis=1) < 0.0
         lines = [line for line, counts in zip(lines, np.repeat(loses, len(_PARTS)), strict=True) if counts]
         best = 0.0
@@ -209,11 +226,12 @@ class _Part:
         return best
 
     def _volumes(self, lines: list[_Line], amplitude: float) -> NDArray[np.float64]:
-        """Of every frame, shape (n,): what swells is as much thinner where the joint is straight as it swells at
-        rest."""
+        """Volume of every frame [m³], shape (frames,). Offsets are divided by the swelling at rest, so that the rest
+        pose stays exact."""
         thinner = (1.0 + amplitude * self.at_rest)[:, None]
         return np.array([self._volume(base + (own + amplitude * out) / thinner) for base, own, out in lines])
 
     def _volume(self, points: NDArray[np.float64]) -> float:
+        """Contribution of the part's faces to the enclosed volume [m³]."""
         a, b, c = ((self.corners @ points)[self.faces[:, k]] for k in range(3))
         return float(np.einsum("ti,ti->", a, np.cross(b, c))) / 6.0

@@ -1,4 +1,4 @@
-"""How thick a limb is at every vertex: how far the skin lies from its bones."""
+"""Thickness of the flesh at every vertex: distance of the skin from its segments."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ __all__ = ["thickness"]
 
 
 def thickness(anchors: Anchors, joints: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean distance of every vertex from its place on each of its segments [m], by the operators' weights, shape (V,).
+    """Mean distance of every vertex from its projections on its segments [m], weighted by the operators, shape (V,).
 
-    Not the distance from the mean of those places: in a web that lies between two fingers, where the skin is too, and
-    fields would stay as steep there as they are.
+    Not the distance from the mean of the projections: in a web this mean lies between two fingers, close to the skin,
+    and fields would hardly be diffused there.
 
     Args:
-        anchors: Places of V vertices.
+        anchors: Coordinates of V vertices.
         joints: Rest positions [m], shape (J, 3).
     """
     start, end = (joints[anchors.ends[anchors.segment, k]] for k in (0, 1))

@@ -1,4 +1,4 @@
-"""Short rows: what is left of diffused fields once their faint ends are taken away, without a jump."""
+"""Sparsification of diffused fields by soft thresholding, which keeps them continuous."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ else:
 __all__ = ["THRESHOLD", "thinned", "thinned_slope"]
 
 THRESHOLD = 0.01
-"""What every coefficient is drawn towards zero by. A larger one makes rows shorter and evaluation quicker, but where
-many fields overlap, as in a shoulder, .03 is seen: it takes a fifth of the smoothness that diffusion gave."""
+"""Threshold by which every coefficient is shrunk towards zero. A larger one makes rows shorter and evaluation faster,
+but where many fields overlap, as at a shoulder, .03 is visible: it loses a fifth of the smoothness that diffusion
+gave."""
 
 
 def thinned(fields: Fields) -> Fields:
-    """x ← sign(x) max(|x| − ``THRESHOLD``, 0); rows of positions and rotations are scaled back to a sum of one."""
+    """Fields after x ← sign(x) max(|x| − ``THRESHOLD``, 0), with rows of positions and rotations renormalised to a sum
+    of one."""
     return Fields(
         _summing_to_one(fields.positions),
         _summing_to_one(fields.turns),
@@ -35,9 +37,9 @@ def thinned(fields: Fields) -> Fields:
 
 
 def thinned_slope(turns: sp.csr_array, thin: sp.csr_array, slope: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives by rotations' weights before thinning, from those by the weights ``thin`` after it, both dense.
+    """Adjoint of thinning: derivatives by rotations' weights before it, from those by the weights ``thin`` after it.
 
-    w = t / Σ t with t the shrunk weights, so dw/dt = (1 − w Σ) / Σ t where t is left at all.
+    w = t / Σ t with t the shrunk weights, so dw/dt = (1 − w Σ) / Σ t where t is not zero.
     """
     left = thin.toarray()
     total = np.asarray(_shrunk(turns).sum(axis=1))[:, None]
@@ -54,8 +56,7 @@ def _shrunk(fields: sp.csr_array) -> sp.csr_array:
 
 
 def _summing_to_one(fields: sp.csr_array) -> sp.csr_array:
-    """Rows that hold nothing but faint entries, as of more joints than any skeleton has in one place, stay as they
-    are."""
+    """Fields shrunk, and rows normalised to a sum of one; unchanged where some row has negligible entries only."""
     thin = _shrunk(fields)
     total = np.asarray(thin.sum(axis=1)).ravel()
     if (total < THRESHOLD).any():

@@ -1,4 +1,4 @@
-"""What a pose may differ by from what it was, and still not be worse."""
+"""Tolerances by which the quality of a pose may decrease in calibration."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ class Tolerances:
     """Tolerances of one pose.
 
     Attributes:
-        volume: Growth of the volume error, of the whole; and
-        region: of what the pose moves, that do not count.
-        volume_free: Error of the whole, and
-        region_free: of what the pose moves, up to which it may grow at will.
-        folds: Faces that fold, as a factor and
-        folds_more: as a number.
-        roughness: As a factor, and
-        roughness_more: RMS of dihedral angles [rad].
+        volume: Tolerated growth of the volume error, relative to the whole volume.
+        region: The same, relative to the volume that the pose moves.
+        volume_free: Volume error below which any growth is tolerated, relative to the whole volume.
+        region_free: The same, relative to the volume that the pose moves.
+        folds: Tolerated factor of the number of folded faces.
+        folds_more: Tolerated number of folded faces in addition.
+        roughness: Tolerated factor of the roughness (RMS growth of dihedral angles).
+        roughness_more: Tolerated roughness in addition [rad].
     """
 
     volume: float = 0.001

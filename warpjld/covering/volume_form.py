@@ -1,7 +1,7 @@
-"""Enclosed volume as a quadratic form of amplitudes: V(S + D a) = V(S) + g · a + ½ a · H a.
+"""Enclosed volume as a quadratic function of amplitudes: V(S + D a) = V(S) + g · a + ½ a · H a.
 
-Volume is cubic in positions. Roundings and muscles move the skin away from its bones, in two of three dimensions, so
-the third power of amplitudes is left out.
+Volume is cubic in positions. Roundings and muscles move the skin perpendicularly to its bones, in two of three
+dimensions, so the third power of amplitudes is omitted.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["ClosedSurface", "VolumeForm", "any_of"]
 
 
 def any_of(chosen: NDArray[np.bool_], corners: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Whether any corner of a face, edge or hinge (N, k) is chosen; far quicker than ``any`` along so short an axis."""
+    """Whether any corner of a face, edge or hinge (N, k) is chosen; far faster than ``any`` along so short an axis."""
     out = chosen[corners[:, 0]]
     for k in range(1, corners.shape[1]):
         out = out | chosen[corners[:, k]]
@@ -27,12 +27,12 @@ def any_of(chosen: NDArray[np.bool_], corners: NDArray[np.integer]) -> NDArray[n
 
 
 class ClosedSurface:
-    """Faces of a surface with the fans that close its open rims, around one more point for each of them.
+    """A surface whose boundary loops (rims) are closed by fans around one additional point each.
 
     Attributes:
-        faces: Shape (T + B, 3).
-        rims: Mean of each rim's vertices, shape (rims, V).
-        volume: At rest [m³].
+        faces: Triangles with those of the fans, shape (T + B, 3); additional points follow the V vertices.
+        rims: Matrix that averages each rim's vertices, shape (rims, V).
+        volume: Volume at rest [m³].
     """
 
     def __init__(self, surface: Surface) -> None:
@@ -48,7 +48,7 @@ class ClosedSurface:
         """Volume [m³] of positions (V, 3)."""
         centred = points - points.mean(axis=0)
         everywhere = np.concatenate([centred, self.rims @ centred])
-        # of a · (b × c), six products a coordinate triple, none of which needs its own vector
+        # a · (b × c) written out by coordinates, without temporary vectors
         x, y, z = (everywhere[:, k][self.faces] for k in range(3))
         six = x[:, 0] * (y[:, 1] * z[:, 2] - z[:, 1] * y[:, 2])
         six += y[:, 0] * (z[:, 1] * x[:, 2] - x[:, 1] * z[:, 2])
@@ -58,7 +58,7 @@ class ClosedSurface:
 
 @dataclass(frozen=True, eq=False)
 class VolumeForm:
-    """Lost volume of one pose [m³] by p amplitudes.
+    """Volume of one pose relative to rest [m³], as a quadratic function of p amplitudes.
 
     Attributes:
         constant: V(S) − V of the rest surface.
@@ -74,19 +74,19 @@ class VolumeForm:
     def of(
         surface: ClosedSurface, points: NDArray[np.float64], moved: NDArray[np.int64], directions: sp.csr_array
     ) -> VolumeForm:
-        """Of positions S (V, 3) and directions D (3 n, p) of the n vertices that move."""
+        """The function around positions S [m] (V, 3), with derivatives D (3 n, p) of the n vertices ``moved``."""
         centred = points - points.mean(axis=0)
         everywhere = np.concatenate([centred, surface.rims @ centred])
         touched = np.zeros(len(everywhere), dtype=bool)
         touched[moved] = True
-        hung = np.flatnonzero(surface.rims @ touched[: len(points)].astype(np.float64))
-        touched[len(points) + hung] = True
+        touched_rims = np.flatnonzero(surface.rims @ touched[: len(points)].astype(np.float64))
+        touched[len(points) + touched_rims] = True
         faces = surface.faces[any_of(touched, surface.faces)]
         used = np.unique(faces)
         number = np.full(len(everywhere), -1)
         number[used] = np.arange(len(used))
         faces, local = number[faces], everywhere[used]
-        rows = _directions_of(directions, moved, surface.rims, hung, number)
+        rows = _directions_of(directions, moved, surface.rims, touched_rims, number)
         a, b, c = (local[faces[:, k]] for k in range(3))
         slope = np.zeros_like(local)
         for k, normal in enumerate((np.cross(b, c), np.cross(c, a), np.cross(a, b))):
@@ -104,7 +104,8 @@ class VolumeForm:
 
 
 def _bilinear(points: NDArray[np.float64], faces: NDArray[np.int64]) -> sp.csr_array:
-    """Second derivatives of the volume by positions, shape (3 n, 3 n): for corners a, b of a face, u · (v × c) / 6."""
+    """Second derivatives of the volume by positions, shape (3 n, 3 n): u · (v × c) / 6 for each pair of corners of a
+    face that move by u and v, c the third."""
     rows, columns, values = [], [], []
     for first, second, other in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         c = points[faces[:, other]] / 6.0
@@ -124,16 +125,24 @@ def _directions_of(
     directions: sp.csr_array,
     moved: NDArray[np.int64],
     rims: sp.csr_array,
-    hung: NDArray[np.int64],
+    touched_rims: NDArray[np.int64],
     number: NDArray[np.int64],
 ) -> sp.csr_array:
-    """D of the vertices that move, (3 n, p), as D of all numbered points; the centres of rims move with their mean."""
+    """Derivatives of the moved vertices (3 n, p), as those of all numbered points; centres of rims get their mean's.
+
+    Args:
+        directions: Derivatives of the moved vertices, shape (3 n, p).
+        moved: Their indices, shape (n,).
+        rims: As in :class:`ClosedSurface`.
+        touched_rims: Rims with moved vertices.
+        number: Row of each point in the result, -1 for those left out.
+    """
     parts, places = [directions], [moved]
-    if hung.size:
-        mean = rims[hung][:, moved]
+    if touched_rims.size:
+        mean = rims[touched_rims][:, moved]
         axes = [sp.csr_array(mean @ directions[k::3]) for k in range(3)]
-        parts.append(sp.vstack([axes[k][n : n + 1] for n in range(len(hung)) for k in range(3)], format="csr"))
-        places.append(rims.shape[1] + hung)
+        parts.append(sp.vstack([axes[k][n : n + 1] for n in range(len(touched_rims)) for k in range(3)], format="csr"))
+        places.append(rims.shape[1] + touched_rims)
     stacked = sp.vstack(parts, format="csr").tocoo()
     row, axis = np.divmod(stacked.coords[0], 3)
     rows = 3 * number[np.concatenate(places)[row]] + axis

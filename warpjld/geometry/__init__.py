@@ -1,1 +1,1 @@
-"""Surfaces, rotations and what both rest on."""
+"""Geometry without skeletons: triangulated surfaces, normals, winding numbers, rotations and scales."""

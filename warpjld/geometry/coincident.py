@@ -1,7 +1,7 @@
-"""Points that lie in the same place, and what hangs together by them.
+"""Coincident points, and connected components of a graph, in plain NumPy.
 
-SciPy's k-d tree and graph search give the same, but importing them takes a quarter of the time in which a command
-deforms a clip, and every rig that is read is searched so.
+SciPy's k-d tree and graph search give the same results, but importing them takes a quarter of the time of a command
+that deforms a clip, and every rig that is read needs them.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 
 __all__ = ["close_pairs", "connected_parts"]
 
-# in no direction that a modeller gives points: few lie beside each other along it that do not lie near each other
+# a generic direction, along which only points that are near each other have nearly equal coordinates in most models
 _ASKEW = np.array([0.5257, 0.6180, 0.5846])
-_ROUNDING = 1e-14  # of the largest coordinate
+_ROUNDING = 1e-14  # error of projections on it, relative to the largest coordinate
 
 
 def close_pairs(points: NDArray[np.float64], distance: float) -> NDArray[np.int64]:
-    """All pairs of points no further from each other than a distance, the lower number first, shape (m, 2).
+    """All pairs of points within a distance of each other, the lower index first, shape (m, 2).
 
-    Points are sorted along a line, and each is compared with those that follow it there.
+    Points are sorted along a line, and each is compared with its successors there (sweep and prune).
 
     Args:
-        points: Shape (n, 3).
-        distance: Small beside the distances of most points.
+        points: Positions, shape (n, 3).
+        distance: Largest distance; should be small compared with the distances of most points.
     """
     along = points @ (_ASKEW / np.linalg.norm(_ASKEW))
     order = np.argsort(along, kind="stable")
@@ -43,14 +43,15 @@ def close_pairs(points: NDArray[np.float64], distance: float) -> NDArray[np.int6
 
 
 def connected_parts(links: NDArray[np.integer], count: int) -> NDArray[np.int64]:
-    """Part of every one of ``count`` things that links (m, 2) join, numbered by the first thing of each."""
+    """Connected component of each of ``count`` nodes of a graph with edges ``links`` (m, 2), shape (count,), numbered
+    in the order of their first nodes."""
     lowest = np.arange(count)
     while True:
         a, b = lowest[links[:, 0]], lowest[links[:, 1]]
         apart = a != b
         if not apart.any():
             return np.unique(lowest, return_inverse=True)[1].ravel()
-        # whatever is lowest in either of two joined parts becomes lowest in both
+        # union: the higher root of two linked components gets the lower one as its parent
         links, a, b = links[apart], a[apart], b[apart]
         np.minimum.at(lowest, np.maximum(a, b), np.minimum(a, b))
         while (further := lowest[lowest]).tobytes() != lowest.tobytes():

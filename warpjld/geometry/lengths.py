@@ -1,7 +1,7 @@
-"""The range of lengths that is computed with: surfaces are moved in single floats.
+"""Admissible range of coordinates and sizes, since surfaces are deformed in single precision.
 
-A single float has seven digits and ends at 3e38, and volumes, areas and their squares are built of lengths: between
-SMALLEST and LARGEST none of them runs out of it.
+A single float has seven digits and ends at 3e38, and volumes, areas and their squares are powers of lengths: between
+SMALLEST and LARGEST none of them overflows or underflows.
 """
 
 from __future__ import annotations
@@ -20,14 +20,19 @@ SMALLEST = 1e-5
 LARGEST = 1e6
 """Furthest coordinate from the origin [m]: a thousand kilometres."""
 FURTHEST = 1e12
-"""Largest number of a file's coordinates, in its own unit."""
+"""Largest absolute value of a file's coordinates, in its own unit."""
 
 
 def check_reach(numbers: NDArray[np.float64], what: str, *, path: str | Path | None = None) -> None:
-    """Make sure that a file's own coordinates are finite and no larger than FURTHEST.
+    """Check that a file's own coordinates are finite and no larger than FURTHEST.
+
+    Args:
+        numbers: Coordinates of any shape, in the file's unit.
+        what: Their name in messages.
+        path: The file concerned.
 
     Raises:
-        InputError: One is not.
+        InputError: One of them is not.
     """
     reach = float(np.abs(numbers).max(initial=0.0))
     if not reach <= FURTHEST:
@@ -42,17 +47,17 @@ def check_size(
     least: float = SMALLEST,
     path: str | Path | None = None,
 ) -> None:
-    """Make sure that points (…, 3) [m] lie in the range that is computed with.
+    """Check that points lie within the admissible range.
 
     Args:
-        points: Positions.
-        what: Called so in messages.
-        remedy: What would bring them into the range.
-        least: Smallest diagonal of their bounding box; 0 where they may be one point.
+        points: Positions [m], shape (…, 3).
+        what: Their name in messages.
+        remedy: What the user can change to bring them into the range.
+        least: Smallest diagonal of their bounding box [m]; 0 where they may coincide.
         path: The file concerned.
 
     Raises:
-        InputError: They do not.
+        InputError: They reach beyond LARGEST, or are smaller than ``least``.
     """
     flat = points.reshape(-1, 3)
     if not len(flat):

@@ -9,14 +9,14 @@ __all__ = ["vertex_normals"]
 
 
 def vertex_normals(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.float32]:
-    """Unit normals, the mean of the adjacent faces' weighted by their areas.
+    """Unit vertex normals: area-weighted mean of the adjacent faces' normals.
 
     Args:
         vertices: Positions, shape (V, 3). Weld texture seams first, or they show as edges.
         faces: Triangles, shape (T, 3), anticlockwise seen from outside.
 
     Returns:
-        Normals, shape (V, 3); +Z for a vertex without area around it, so that no normal is zero.
+        Normals, shape (V, 3); +Z for a vertex without adjacent area, so that no normal is zero.
     """
     a, b, c = (np.asarray(vertices, np.float64)[faces[:, corner]] for corner in range(3))
     weighted = np.cross(b - a, c - a)

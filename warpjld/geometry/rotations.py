@@ -1,4 +1,4 @@
-"""Quaternion arithmetic of many frames: products, minimal rotations, spherical interpolation. Order x, y, z, w."""
+"""Vectorised quaternion arithmetic: products, minimal rotations, spherical interpolation. Order x, y, z, w."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
     "upright",
 ]
 
-_PARALLEL = 1e-12  # length of the sum of two opposite unit vectors that is nothing but rounding
+_PARALLEL = 1e-12  # length of the sum of two unit vectors below which they count as opposite
 
 
 def unit(vectors: ArrayLike) -> NDArray[np.float64]:
@@ -31,18 +31,19 @@ def unit(vectors: ArrayLike) -> NDArray[np.float64]:
 
 
 def upright(up: str | None) -> NDArray[np.float64]:
-    """Rotation matrix that brings a file's up axis, ``y`` or ``z``, to Y; none where the file does not say."""
+    """Rotation matrix (3, 3) that turns a file's up axis, ``y`` or ``z``, to Y; the identity where it is None."""
     return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) if up == "z" else np.eye(3)
 
 
 def about(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations about vectors (…, 3) by their length [rad], shape (…, 4)."""
+    """Quaternions (…, 4) of rotation vectors (…, 3): about their direction by their length [rad]."""
     half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
 
 
 def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Hamilton product: first ``b``, then ``a``; shapes broadcast. Signs are kept: a rotation library may flip them."""
+    """Hamilton product a b, the rotation by ``b``, then by ``a``; shapes broadcast. Signs are kept, which rotation
+    libraries may change."""
     ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     return np.stack(
@@ -62,9 +63,9 @@ def conjugate(a: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def rotate(a: NDArray[np.float64], vectors: ArrayLike) -> NDArray[np.float64]:
-    """Vectors turned by quaternions of any length but zero; shapes broadcast.
+    """Vectors (…, 3) turned by quaternions (…, 4) of any length but zero; shapes broadcast.
 
-    v + 2 u × (u × v + w v) / |q|², u the vector part.
+    v + 2 u × (u × v + w v) / |q|², u the vector part and w the scalar part of q.
     """
     v = np.asarray(vectors, dtype=np.float64)
     x, y, z, w = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
@@ -81,9 +82,11 @@ def matrices(a: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def axis_turns() -> NDArray[np.float64]:
-    """The 24 rotations that turn axes into axes, shape (24, 4); the last component that is not zero is positive."""
+    """The 24 rotations that map coordinate axes to coordinate axes, shape (24, 4); signs are chosen so that the last
+    non-zero component is positive."""
     halves = np.array(list(product((-1.0, 0.0, 1.0), repeat=4)))
-    count = np.abs(halves).sum(axis=1)  # about axes by quarters and halves, about diagonals of faces and of the cube
+    # non-zero components: one for 0° and 180° about axes, two for 90° and for face diagonals, four for 120°
+    count = np.abs(halves).sum(axis=1)
     turns = halves[(count == 1) | (count == 2) | (count == 4)]
     last = np.take_along_axis(turns, 3 - (turns[:, ::-1] != 0.0).argmax(axis=1)[:, None], axis=1)
     return unit(turns[last[:, 0] > 0.0])
@@ -92,7 +95,8 @@ def axis_turns() -> NDArray[np.float64]:
 def minimal_rotation(start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
     """The smallest rotation that turns direction ``start`` into ``end``, about their common normal.
 
-    Opposite directions, where any normal would do, turn about the one closest to a coordinate axis.
+    For opposite directions, where the axis is not unique, it is ``start`` × the coordinate axis most perpendicular to
+    it.
     """
     a, b = np.broadcast_arrays(unit(start), unit(end))
     half = unit(a + b)
@@ -105,7 +109,7 @@ def minimal_rotation(start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
 
 
 def slerp(times: NDArray[np.float64], rotations: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Spherical interpolation along the first axis, the short way; held before the first and after the last.
+    """Spherical linear interpolation along the first axis, the short way; constant before the first and after the last.
 
     Args:
         times: Increasing times of the K rotations, shape (K,).

@@ -1,4 +1,4 @@
-"""Values of vertices that have none, from their neighbours on the surface."""
+"""Harmonic extension of vertex values over a surface to vertices that have none."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ else:
 
 __all__ = ["spread"]
 
-_STEPS = 2_000  # of the iteration; what it has not levelled out by then differs by little
-_SETTLED = 1e-9  # of the largest value: change of a sweep that is rounding
+_STEPS = 2_000  # iteration limit
+_SETTLED = 1e-9  # change in an iteration, relative to the largest value, at which it ends
 
 
 def spread(
@@ -29,10 +29,10 @@ def spread(
 ) -> NDArray[np.float64]:
     """Values (V, n) whose unknown rows are means of their neighbours along edges, weighted by 1 / length.
 
-    Pieces of the surface without any known vertex take the row of the known vertex that is nearest to each vertex.
+    Vertices of connected components without any known vertex take the row of the nearest known vertex.
 
     Args:
-        values: Rows, of which the unknown ones are not looked at, shape (V, n).
+        values: Rows, of which the unknown ones are ignored, shape (V, n).
         known: Which rows are known, at least one, shape (V,).
         vertices: Positions, shape (V, 3).
         faces: Triangles, shape (T, 3).
@@ -59,7 +59,7 @@ def spread(
         fixed = rows[:, near] @ values[near]
         among = rows[:, inner].tocsr()
         x = out[inner]
-        for _ in range(_STEPS):  # Jacobi, in place of a solver: a mean of means stays within what is known
+        for _ in range(_STEPS):  # Jacobi iteration: unlike a direct solver it stays within the range of known values
             x, before = among @ x + fixed, x
             if np.abs(x - before).max(initial=0.0) < _SETTLED * max(float(np.abs(x).max(initial=0.0)), 1e-300):
                 break

@@ -1,4 +1,4 @@
-"""A triangulated surface: welded geometry to compute on, and the source's own vertex order to export."""
+"""Triangulated surface: welded vertices for computing, and the source's own vertex order for export."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from warpjld.geometry.coincident import close_pairs, connected_parts
 
 __all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
 
-_SEAM = 1e-6  # of the surface's size: borders of parts nearer than this are one, as a file's single floats leave them
+_SEAM = 1e-6  # relative to the surface's size: border vertices of two parts nearer than this coincide (float32 files)
 
 
 @dataclass(frozen=True)
@@ -34,16 +34,16 @@ class Surface:
         faces: Triangles over the welded vertices, shape (T, 3), anticlockwise seen from outside.
         weld: Welded vertex of every source vertex, shape (W,).
         source_faces: Triangles over the source vertices, shape (S, 3), in the source's order.
-        uv: Texture coordinates of the source vertices, shape (W, 2), or None. Their origin is the picture's lower
-            left corner, as OBJ, USD and Blender count; glTF counts from the upper left.
+        uv: Texture coordinates of the source vertices, shape (W, 2), or None. Their origin is the image's lower left
+            corner, as in OBJ, USD and Blender; in glTF it is the upper left one.
         corner_uv: Texture coordinates of the source faces' corners, shape (S, 3, 2), instead of ``uv`` where some
             vertex has several: the texture's seams.
         parts: The source's meshes.
         polygons: Polygon of the source that each source face is a part of, shape (S,), counted from 0 in the source's
             order, mesh after mesh; None where all are triangles.
 
-    People count vertices and facets as the source does: vertex ``v`` of these is ``numbers[v]`` there, and ``weld``
-    leads back; triangle ``t`` belongs to facet ``facets[t]`` (R133).
+    Users refer to vertices and facets by the source's numbers: welded vertex ``v`` is ``numbers[v]`` there, and
+    ``weld`` is the map back; triangle ``t`` belongs to facet ``facets[t]`` (R133).
     """
 
     vertices: NDArray[np.float64]
@@ -57,18 +57,18 @@ class Surface:
 
     @cached_property
     def numbers(self) -> NDArray[np.int64]:
-        """Number that every welded vertex has in the source, the first of those it was welded from, shape (V,)."""
+        """First source vertex that every welded vertex was made from, shape (V,)."""
         return np.unique(self.weld, return_index=True)[1]
 
     @cached_property
     def source_rows(self) -> NDArray[np.int64]:
-        """Source face of every triangle, shape (T,): those that welding flattened are left out."""
+        """Source face of every triangle, shape (T,); source faces that welding made degenerate have none."""
         a, b, c = self.weld[self.source_faces].T
         return np.flatnonzero((a != b) & (b != c) & (c != a))
 
     @cached_property
     def facets(self) -> NDArray[np.int64]:
-        """Facet of the source, triangle or larger polygon, that every triangle is a part of, shape (T,)."""
+        """Polygon of the source that every triangle is a part of, shape (T,)."""
         return self.source_rows if self.polygons is None else self.polygons[self.source_rows]
 
     def __repr__(self) -> str:
@@ -76,7 +76,7 @@ class Surface:
 
     @property
     def size(self) -> float:
-        """Diagonal of the bounding box [m]: what tolerances are relative to."""
+        """Diagonal of the bounding box [m], to which tolerances are relative."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
 
     def to_source(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -88,11 +88,11 @@ class Surface:
         return np.array_equal(self.weld, np.arange(len(self.vertices)))
 
     def split_at_seams(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32] | None]:
-        """Vertices that have one pair of texture coordinates each, for files that know no others.
+        """Split vertices at texture seams, for file formats with one pair of texture coordinates per vertex.
 
         Returns:
-            Source vertex of every split one, shape (N,): the source's W in their order, then copies of those on seams;
-            triangles over them, shape (S, 3); their texture coordinates, shape (N, 2), or None.
+            Source vertex of every resulting vertex, shape (N,): the source's W in their order, then copies of those on
+            seams; triangles over them, shape (S, 3); their texture coordinates, shape (N, 2), or None.
         """
         count = len(self.weld)
         if self.corner_uv is None:
@@ -101,7 +101,7 @@ class Surface:
         keyed = np.column_stack([corners, self.corner_uv.reshape(-1, 2)])
         kinds, first, kind = np.unique(keyed, axis=0, return_index=True, return_inverse=True)
         vertex = corners[first]
-        # sorted by vertex: the first kind of each stays at its place
+        # sorted by vertex: the first pair of coordinates of each keeps the vertex's own index
         extra = np.concatenate([[False], vertex[1:] == vertex[:-1]])
         place = np.where(extra, count + np.cumsum(extra) - 1, vertex).astype(np.int32)
         origin = np.concatenate([np.arange(count, dtype=np.int32), vertex[extra]])
@@ -110,7 +110,7 @@ class Surface:
         return origin, place[kind.ravel()].reshape(-1, 3), uv
 
     def renumbered(self, order: NDArray[np.int32]) -> Surface:
-        """The same surface with vertex ``order[i]`` as its i-th; the source's order does not change."""
+        """The surface with vertices permuted, ``order[i]`` becoming the i-th; the source's order does not change."""
         place = np.empty(len(order), dtype=np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)
         return replace(self, vertices=self.vertices[order], faces=place[self.faces], weld=place[self.weld])
@@ -119,10 +119,10 @@ class Surface:
 def one_uv_a_vertex(
     count: int, faces: NDArray[np.integer], corner_uv: NDArray[np.float32] | None
 ) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
-    """Texture coordinates of corners (S, 3, 2) as ``uv`` (count, 2) where all at a vertex agree, else as they are.
+    """Texture coordinates by vertex (count, 2) where all corners (S, 3, 2) at each vertex agree, else by corner.
 
     Returns:
-        ``uv`` and ``corner_uv`` of a surface, one of which is None; both where there are none.
+        ``uv`` and ``corner_uv`` of a surface, one of which is None; both are where there are no coordinates.
     """
     if corner_uv is None:
         return None, None
@@ -142,20 +142,20 @@ def weld_surface(
     joins: NDArray[np.bool_] | None = None,
     tolerance: float = 1e-7,
 ) -> Surface:
-    """Weld source vertices that lie at the same place, within a part; and the borders of parts that coincide.
+    """Weld coincident source vertices within each part, and coincident border vertices of different parts.
 
-    Joined so, the pieces of a hand, a hand and a body, or clothes and the skin that goes on from them are one surface,
-    which nothing parts (R18).
+    The pieces of a hand, a hand and a body, or clothes and the adjacent skin so become one connected surface, which
+    deformation does not tear (R18).
 
     Args:
         vertices: Source positions [m], shape (W, 3).
         faces: Source triangles, shape (S, 3).
         uv: Texture coordinates, shape (W, 2).
         corner_uv: Texture coordinates of the faces' corners, shape (S, 3, 2), instead of ``uv``.
-        parts: Source meshes; of different ones only border vertices are welded.
-        polygons: Polygon of each source triangle, shape (S,), where the source has larger ones.
-        joins: Vertices whose border may be joined to another part's, shape (W,); all by default. What is rigid may not.
-        tolerance: Distance below which two vertices are one, relative to the diagonal of the faces' bounding box.
+        parts: Source meshes; between different ones only border vertices are welded.
+        polygons: Polygon of each source triangle, shape (S,), where the source has larger polygons.
+        joins: Vertices that may be welded to another part's, shape (W,); all by default. Rigid ones may not.
+        tolerance: Distance below which two vertices are welded, relative to the diagonal of the faces' bounding box.
 
     Raises:
         InputError: Wrong shapes, not finite, no faces, or an index out of range.
@@ -172,7 +172,7 @@ def weld_surface(
         raise InputError(f"faces: indices must lie in 0…{len(points) - 1}, got {triangles.min()}…{triangles.max()}")
     if not parts:
         parts = (Part("surface", slice(0, len(points)), slice(0, len(triangles))),)
-    # vertices that no face uses may lie anywhere
+    # of vertices that faces use: others may lie anywhere
     size = float(np.linalg.norm(np.ptp(points[triangles.ravel()], axis=0)))
     owner = np.arange(len(points))
     for part in parts:
@@ -207,15 +207,15 @@ def _joined_borders(
     joins: NDArray[np.bool_] | None,
     distance: float,
 ) -> NDArray[np.int64]:
-    """The vertex that stands for each, shape (W,), where borders of different parts within ``distance`` are one.
+    """Representative vertex of each, shape (W,), after welding the borders of different parts.
 
     Args:
         points: Source positions [m], shape (W, 3).
-        faces: Triangles over the vertices that stand for others, shape (S, 3).
-        owner: Those, shape (W,).
+        faces: Triangles over representatives, shape (S, 3).
+        owner: Representative vertex of each before that, shape (W,).
         parts: The source's meshes.
-        joins: Vertices that may be joined, shape (W,); None for all.
-        distance: [m].
+        joins: Vertices that may be welded to another part's, shape (W,); None for all.
+        distance: Largest distance of welded vertices [m].
     """
     solid = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
     half = np.sort(np.concatenate([solid[:, [0, 1]], solid[:, [1, 2]], solid[:, [2, 0]]]), axis=1)
@@ -225,8 +225,8 @@ def _joined_borders(
         border = border[joins[border]]
     pairs = border[close_pairs(points[border], max(distance, 1e-12))]
     part = np.zeros(len(points), dtype=np.int64)
-    for k, one in enumerate(parts):
-        part[one.vertices] = k
+    for k, mesh in enumerate(parts):
+        part[mesh.vertices] = k
     pairs = pairs[part[pairs[:, 0]] != part[pairs[:, 1]]]
     if not len(pairs):
         return owner

@@ -1,4 +1,4 @@
-"""Winding numbers in float64: how often a surface goes round a point, by summing every triangle's solid angle."""
+"""Generalised winding numbers of points by direct summation of the triangles' solid angles, in float64."""
 
 from __future__ import annotations
 
@@ -7,26 +7,27 @@ from numpy.typing import NDArray
 
 __all__ = ["winding_numbers"]
 
-_CHUNK = 2_000_000  # point-triangle pairs at a time: about 200 MB of temporaries
+_CHUNK = 2_000_000  # point-triangle pairs at a time: about 200 MB of temporary arrays
 
 
 def winding_numbers(
     vertices: NDArray[np.float64], faces: NDArray[np.integer], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """w = Σ Ω / 4π over all triangles, Ω by the tangent formula of van Oosterom and Strackee (1983), shape (n,).
+    """Winding numbers w = Σ Ω / 4π over all triangles, shape (n,), with solid angles Ω by the tangent formula of van
+    Oosterom and Strackee (1983).
 
-    1 inside a closed surface and 0 outside; 2 where two closed parts overlap; between where a surface is open, such as
-    a hand at its wrist.
+    1 inside a closed surface and 0 outside; 2 where two closed parts overlap; in between where a surface is open, such
+    as a hand at its wrist.
 
     Args:
         vertices: Positions [m], shape (V, 3).
         faces: Triangles, anticlockwise seen from outside, shape (T, 3).
-        points: Where [m], shape (n, 3).
+        points: Points of evaluation [m], shape (n, 3).
     """
     middle = vertices.mean(axis=0)
     vertices, points = vertices - middle, points - middle
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    # every term is linear in the point but for its square, so each is one matrix product
+    # apart from its square every term is linear in the point, hence a matrix product
     normal = np.cross(a, b) + np.cross(b, c) + np.cross(c, a)
     volume = np.einsum("fk,fk->f", a, np.cross(b, c))
     out = np.empty(len(points))

@@ -1,4 +1,4 @@
-"""The built-in hand, made by the program itself (R7, R13)."""
+"""The built-in hand, generated procedurally from measures (R7, R13)."""
 
 from warpjld.hand.anthropometry import percentile
 from warpjld.hand.build import build_hand

@@ -1,4 +1,4 @@
-"""Hand sizes of a population, for `build_hand(**percentile(50, "female"))`."""
+"""Percentiles of hand length and breadth in a population, for `build_hand(**percentile(50, "female"))`."""
 
 from __future__ import annotations
 

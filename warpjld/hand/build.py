@@ -1,4 +1,4 @@
-"""The built-in hand: plan, implicit flesh, triangulation, and the rig made of them."""
+"""The built-in hand as a rig: layout, implicit surface, triangulation and skeleton."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def build_hand(
         length: From the wrist's crease to the tip of the middle finger [m].
         breadth: Across the palm at the heads of the metacarpals, without the thumb [m].
         proportions: Digit → scale of its length, or (scale of its length, scale of its thickness). Length and
-            breadth of the hand stay what was asked for.
-        resolution: Wanted number of vertices, about.
+            breadth of the hand do not change by it.
+        resolution: Approximate number of vertices.
 
     Returns:
         The rig: 26 joints, root ``SIDE.forearm``.
@@ -58,7 +58,7 @@ def build_hand(
         >>> wj.build_hand("left", resolution=1500)
         Rig('left hand': 26 joints, ... vertices, ... triangles)
     """
-    # SciPy's splines, which shape it, take as long to import as a whole hand takes to be read
+    # imported here: SciPy's splines take as long to import as a stored hand takes to be read
     from warpjld.hand.fit import fit_plan
     from warpjld.hand.flesh import PlannedFlesh
     from warpjld.hand.triangulate import triangulate
@@ -85,12 +85,14 @@ def hand_rig(side: str, skeleton: Skeleton, vertices: Array, faces: NDArray[np.i
 
 
 def _source(skeleton: Skeleton) -> SourceTree:
+    """The skeleton's joints as a source tree, with unrotated frames."""
     frames = np.tile(np.eye(4), (len(skeleton), 1, 1))
     frames[:, :3, 3] = skeleton.rest
     return SourceTree(skeleton.names, skeleton.parents.astype(np.int64), frames)
 
 
 def _check(side: str, length: float, breadth: float, resolution: int) -> None:
+    """Raise InputError for arguments of ``build_hand`` that are out of range."""
     if side not in ("left", "right"):
         raise InputError(f"side: want 'left' or 'right', got {side!r}")
     if not 0.05 <= length <= 0.30:
@@ -103,6 +105,7 @@ def _check(side: str, length: float, breadth: float, resolution: int) -> None:
 
 
 def _scales(proportions: Mapping[str, float | tuple[float, float]] | None) -> dict[str, tuple[float, float]]:
+    """Checked scales of length and thickness by digit."""
     out = {}
     for digit, scale in (proportions or {}).items():
         if digit not in DIGITS:
@@ -117,12 +120,13 @@ def _scales(proportions: Mapping[str, float | tuple[float, float]] | None) -> di
 
 
 def _surface(vertices: Array, faces: NDArray[np.int32]) -> Surface:
-    """The surface as it is: no two vertices are at one place, so there is nothing to weld."""
+    """The surface without welding, since no two vertices coincide."""
     whole = Part("hand", slice(0, len(vertices)), slice(0, len(faces)))
     return Surface(vertices, faces, np.arange(len(vertices), dtype=np.int32), faces, parts=(whole,))
 
 
 def _skeleton(plan: Plan) -> Skeleton:
+    """Skeleton [m] of a left hand at the joints of its plan."""
     names = ("left.forearm", *hand_joint_names("left"))
     parents = [-1] + [0 if up is None else names.index(f"left.{up}") for up in HAND_PARENTS.values()]
     rest, axes = np.empty((len(names), 3)), np.tile(-_ACROSS, (len(names), 1))

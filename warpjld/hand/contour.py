@@ -1,4 +1,4 @@
-"""A first triangulation of an implicit surface: a grid filled only near the surface, then flying edges."""
+"""Contouring of an implicit surface by flying edges on a grid that is evaluated only near the surface."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _COARSE = 4  # fine cells per coarse cell, along each axis
 def contour(
     field: Callable[[Array], Array], low: Array, high: Array, spacing: float
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Zero level of a signed distance within a box.
+    """Triangulate the zero level set of a signed distance within a box.
 
-    The field is taken on every fourth grid point first; only where the surface may pass is it taken in full. Far from
-    it interpolated values keep the sign, which is all that contouring reads there.
+    The field is evaluated on every fourth grid point first, and on all of them only where the surface may pass. Far
+    from it the coarse values have the right sign, which suffices for contouring.
 
     Args:
         field: Signed distance of points (n, 3), slope of about one.
@@ -35,7 +35,7 @@ def contour(
     cells = np.ceil((high - low) / (spacing * _COARSE)).astype(int)
     coarse_axes = [low[i] + spacing * _COARSE * np.arange(cells[i] + 1) for i in range(3)]
     coarse = field(np.stack(np.meshgrid(*coarse_axes, indexing="ij"), axis=-1).reshape(-1, 3)).reshape(cells + 1)
-    near = np.abs(coarse) < 1.6 * spacing * _COARSE  # half a coarse cell's diagonal, with room for uneven slopes
+    near = np.abs(coarse) < 1.6 * spacing * _COARSE  # half a coarse cell's diagonal, with a margin for other slopes
     sizes = cells * _COARSE + 1
     nearest = [(np.arange(n) + _COARSE // 2) // _COARSE for n in sizes]
     block = np.ix_(*nearest)

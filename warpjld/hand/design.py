@@ -1,4 +1,4 @@
-"""The hand's design: places and sizes of its joints, digits and muscles.
+"""Measures of the built-in hand: positions and sizes of its joints, digits and muscles.
 
 Millimetres on a left hand 190 mm long and 85 mm broad, palm down, as (radial, dorsal, distal) from the wrist.
 """
@@ -44,8 +44,15 @@ CARPOMETACARPAL = {
 
 @dataclass(frozen=True)
 class Finger:
-    """A finger's base joint, phalanges (the last to the skin), half-width at knuckle 2; how far it points, and its nail
-    leans, to the radial side [degrees]."""
+    """Measures of a finger.
+
+    Attributes:
+        base: Position of its base joint [mm].
+        lengths: Lengths of its phalanges, the last one to the skin [mm].
+        half_width: Half-width at knuckle 2 [mm].
+        splay: Angle of its axis towards the radial side [degrees].
+        roll: Lean of its nail towards the radial side [degrees].
+    """
 
     base: Point
     lengths: Point
@@ -56,7 +63,8 @@ class Finger:
 
 @dataclass(frozen=True)
 class Muscle:
-    """A spindle of flesh between two places."""
+    """A spindle of flesh between two points [mm]; ``profile`` has rows of axial fraction, half-width, palmar and dorsal
+    half-height."""
 
     start: Point
     end: Point
@@ -71,8 +79,8 @@ FINGER_DESIGNS = {
 }
 REST_FLEXION = (5.0, 8.0, 5.0)  # degrees of flexion at base, knuckle 2, knuckle 3
 
-# axial place as (joint it counts from, fraction of the segment that follows): half-width, dorsal, palmar half-height,
-# in units of the half-width at knuckle 2
+# rows of joint, fraction of the segment after it, half-width, dorsal and palmar half-height; the last three in units of
+# the half-width at knuckle 2
 FINGER_PROFILE = (
     (-1, 0.0, 0.78, 0.70, 0.80),
     (0, 0.0, 1.02, 1.02, 1.04),
@@ -86,11 +94,11 @@ FINGER_PROFILE = (
     (2, 1.0, 0.67, 0.44, 0.61),
 )
 
-THUMB_BASE = (22.0, -8.0, 22.0)  # mm, of its carpometacarpal joint
-THUMB_LENGTHS = (43.0, 32.0, 27.5)  # mm, of the thumb's bones
-THUMB_HALF_WIDTH = 10.4  # at knuckle 3
-THUMB_ABDUCTION = (42.0, 43.0, 49.0)  # of the three segments, from the hand's axis, in the dorsal view
-THUMB_DEPTH = (25.0, 18.0, 12.0)  # towards the palm
+THUMB_BASE = (22.0, -8.0, 22.0)  # mm, position of its carpometacarpal joint
+THUMB_LENGTHS = (43.0, 32.0, 27.5)  # mm, lengths of the thumb's bones
+THUMB_HALF_WIDTH = 10.4  # mm, at knuckle 3
+THUMB_ABDUCTION = (42.0, 43.0, 49.0)  # degrees of the three segments from the hand's axis in the dorsal view
+THUMB_DEPTH = (25.0, 18.0, 12.0)  # degrees of the three segments towards the palm
 THUMB_ROLL = 65.0  # degrees about its own axis
 THUMB_PROFILE = (
     (-1, 0.0, 0.85, 0.75, 0.80),
@@ -104,7 +112,7 @@ THUMB_PROFILE = (
     (2, 1.0, 0.84, 0.46, 0.64),
 )
 
-# flesh beside the bones: ends, then axial fraction, half-width, palmar and dorsal half-height
+# flesh in addition to that around the bones
 MUSCLES = (
     Muscle(  # thenar eminence
         (10.0, -9.0, 8.0),

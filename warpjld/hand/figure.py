@@ -1,8 +1,7 @@
 """The built-in body: an actor's 87 points in average proportions, and a smooth surface around them (R12, R17).
 
-Heights and lengths are shares of the height (Drillis, Contini 1966), hands as in
-:mod:`warpjld.skeleton.place.hand`; the flesh is a smooth union of round cones, polygonised. Arms hang at 40° from the
-vertical, fingers a little spread.
+Measures are relative to the body's height (Drillis, Contini 1966), hands as in :mod:`warpjld.skeleton.place.hand`; the
+surface is a smooth union of round cones, polygonised. Arms hang at 40° from the vertical, fingers are slightly spread.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ __all__ = ["actor_template", "build_body", "figure_surface"]
 
 Array = NDArray[np.float64]
 
-_ARM = np.radians(50.0)  # below the horizontal
+_ARM = np.radians(50.0)  # angle of the arms below the horizontal
 _FINGERS = {
     # angle from the middle finger [°], then lengths [mm of a hand of 187] to base, knuckle2, knuckle3, tip's centre
     "index": (-15.0, 96.0, 39.8, 22.4, 15.0),
@@ -32,8 +31,8 @@ _FINGERS = {
     "pinky": (27.0, 85.0, 32.7, 18.1, 14.5),
 }
 _THUMB = (-52.0, 28.0, 44.0, 32.0, 20.0)
-_FEWER = 0.8  # of the polygoniser's triangles that flat places do not need
-_SPLAY = 0.75  # of the angle of a metacarpal goes on in its finger
+_FEWER = 0.8  # share of the contour's triangles that decimation removes
+_SPLAY = 0.75  # angle of a finger relative to that of its metacarpal
 _TRUNK = {
     "pelvis": (0.0, 0.535, 0.0),
     "vertebra1": (0.0, 0.575, -0.010),
@@ -61,7 +60,7 @@ _TRUNK = {
 
 
 def actor_template() -> dict[str, Array]:
-    """The 87 points in average proportions, of height 1: x left, y up, z forward, the floor at y = 0."""
+    """Positions of the 87 points for a height of 1: x left, y up, z forward, the floor at y = 0."""
     points = {name: np.array(place) for name, place in _TRUNK.items()}
     down = np.array([np.cos(_ARM), -np.sin(_ARM), 0.0])
     forward, back = np.array([0.0, 0.0, 1.0]), np.array([np.sin(_ARM), np.cos(_ARM), 0.0])
@@ -72,7 +71,7 @@ def actor_template() -> dict[str, Array]:
     scale = 0.108 / 187.0
 
     def heading(degrees: float, lowered: float = 0.0) -> Array:
-        # the thumb's side is forward, the palm faces the body
+        # the hand hangs with the thumb's side forward and the palm towards the body
         angle = np.radians(degrees)
         return unit(np.cos(angle) * down - np.sin(angle) * forward - lowered * back)
 
@@ -87,16 +86,17 @@ def actor_template() -> dict[str, Array]:
     return {name: points[name] for name in ACTOR_POINTS}
 
 
-def _chain(points: dict[str, Array], digit: str, base: Array, bones: list[float], way: Array) -> None:
+def _chain(points: dict[str, Array], digit: str, base: Array, bones: list[float], direction: Array) -> None:
+    """Add the joints of a straight digit to ``points``."""
     place = base
     points[f"{digit}.base"] = place
     for joint, length in zip(("knuckle2", "knuckle3", "tip"), bones, strict=True):
-        place = place + length * way
+        place = place + length * direction
         points[f"{digit}.{joint}"] = place
 
 
 def _radii() -> list[tuple[str, str, float, float]]:
-    """Round cones from point to point with the radii at their ends, shares of the height."""
+    """Round cones: names of both end points and the radii there, relative to the height."""
     trunk = [
         ("pelvis", "vertebra2", 0.078, 0.070),
         ("vertebra2", "vertebra4", 0.070, 0.078),
@@ -140,11 +140,11 @@ def _radii() -> list[tuple[str, str, float, float]]:
 
 
 def figure_surface(points: dict[str, Array], resolution: int = 300) -> tuple[Array, NDArray[np.int32]]:
-    """A closed smooth surface around an actor's points.
+    """Triangulate a closed smooth surface around an actor's points.
 
     Args:
-        points: The 87 points, of height about 1.
-        resolution: Voxels in the height.
+        points: The 87 points, for a height of about 1.
+        resolution: Number of voxels along the height.
 
     Returns:
         Vertices, shape (V, 3), and triangles, shape (T, 3).
@@ -168,7 +168,8 @@ def figure_surface(points: dict[str, Array], resolution: int = 300) -> tuple[Arr
 
 
 def _add_cone(field: Array, low: Array, size: float, a: Array, b: Array, first: float, last: float, far: float) -> None:
-    """Join one round cone to a distance field, smoothly by a share of its radius."""
+    """Smooth union of a distance field with one round cone, in place; the blending radius is 0.35 of the smaller
+    radius."""
     reach = max(first, last) + far
     start = np.maximum(np.floor((np.minimum(a, b) - reach - low) / size).astype(int), 0)
     stop = np.minimum(np.ceil((np.maximum(a, b) + reach - low) / size).astype(int) + 1, field.shape)
@@ -184,11 +185,11 @@ def _add_cone(field: Array, low: Array, size: float, a: Array, b: Array, first: 
 
 
 def build_body(*, height: float = 1.75, resolution: int = 300) -> Rig:
-    """The built-in body, its 87 points exactly placed.
+    """The built-in body with joints exactly at its 87 points.
 
     Args:
         height: From the floor to the crown [m].
-        resolution: Voxels in the height that its surface is made of.
+        resolution: Number of voxels along the height from which its surface is made.
 
     Raises:
         InputError: A height or resolution out of range.
@@ -210,6 +211,7 @@ def build_body(*, height: float = 1.75, resolution: int = 300) -> Rig:
 
 
 def _rig(points: dict[str, Array], vertices: Array, faces: NDArray[np.int32]) -> Rig:
+    """The rig of a body's points and surface [m]."""
     names = list(points)
     frames = np.tile(np.eye(4), (len(names), 1, 1))
     frames[:, :3, 3] = list(points.values())

@@ -1,4 +1,4 @@
-"""Scales of the plan that give a wanted length and breadth, measured on the flesh itself."""
+"""Fit of the plan's scales to a given length and breadth, which are measured on the implicit surface."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["fit_plan", "measure"]
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3  # of measuring and scaling
-_HEADS = 0.42  # distal place of the breadth, across the heads of the metacarpals, in hand lengths
+_ROUNDS = 3  # iterations of measuring and scaling
+_HEADS = 0.42  # distance from the wrist, in hand lengths, where breadth is measured (heads of the metacarpals)
 
 
 def fit_plan(length: float, breadth: float, proportions: Mapping[str, tuple[float, float]]) -> Plan:
-    """The plan of a hand of this length and breadth [mm]."""
+    """The plan of a hand of this length and breadth [mm]; ``proportions`` as of ``plan_hand``."""
     along, across = length / LENGTH, breadth / BREADTH
     for _ in range(_ROUNDS):
         plan = plan_hand(along, across, proportions)
@@ -30,7 +30,12 @@ def fit_plan(length: float, breadth: float, proportions: Mapping[str, tuple[floa
 
 
 def measure(flesh: PlannedFlesh, length: float) -> tuple[float, float]:
-    """Length from the wrist's crease to the tip of the middle finger, and breadth across the palm [mm]."""
+    """Length from the wrist's crease to the tip of the middle finger, and breadth across the palm [mm].
+
+    Args:
+        flesh: The hand's implicit surface.
+        length: Nominal length, which determines where breadth is measured [mm].
+    """
     plan = flesh.plan
     tip = plan.digits["middle"].joints[3]
     reach = 6.0 * float(plan.stretch[0])
@@ -48,7 +53,7 @@ def measure(flesh: PlannedFlesh, length: float) -> tuple[float, float]:
 
 
 def _cross(flesh: PlannedFlesh, start: Array, direction: Array, reach: float) -> Array:
-    """Distance from points inside along a direction to the first crossing of the surface, shape (n,)."""
+    """Distance [mm] from inner points along a direction to the first crossing of the surface, shape (n,)."""
     steps = np.arange(1.0, reach, 1.5)
     marched = start[:, None, :] + steps[:, None] * direction
     outside = flesh(marched.reshape(-1, 3)).reshape(len(start), len(steps)) > 0.0

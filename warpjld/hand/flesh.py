@@ -1,4 +1,4 @@
-"""The whole hand as one implicit surface: palm and digits joined smoothly, fingers not fused to one another."""
+"""Implicit surface of the whole hand: smooth union of palm and digits, with separate fingers."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ __all__ = ["PlannedFlesh"]
 Array = NDArray[np.float64]
 
 _BLOCK = 16_384
-_BETWEEN_FINGERS = 1.6  # blending radii [mm of the design hand]
+_BETWEEN_FINGERS = 1.6  # blending radius between fingers [mm of the design hand]
 _FINGER_ROOT = 9.0  # blending radius at the roots of fingers [mm of the design hand]
-_THUMB_ROOT = 16.0  # likewise
+_THUMB_ROOT = 16.0  # blending radius at the thumb and muscles [mm of the design hand]
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedFlesh:
-    """Signed distance [mm], exact to first order at the surface, of a planned hand.
+    """Signed distance [mm] of a planned hand, exact to first order at the surface.
 
     Attributes:
-        plan: Where everything lies.
-        detail: 0…1, how much of the details that only fine triangles can show (nails).
+        plan: Layout of the hand.
+        detail: Amount of details that need fine triangles (nails), 0…1.
     """
 
     plan: Plan
@@ -40,8 +40,8 @@ class PlannedFlesh:
         scale = float(self.plan.stretch[0])
         fingers = None
         for name in ("pinky", "ring", "middle", "index"):
-            one = self.plan.digits[name].flesh(points, self.detail)
-            fingers = one if fingers is None else _join(fingers, one, _BETWEEN_FINGERS * scale)
+            finger = self.plan.digits[name].flesh(points, self.detail)
+            fingers = finger if fingers is None else _join(fingers, finger, _BETWEEN_FINGERS * scale)
         assert fingers is not None
         hand = _join(PalmSlab(self.plan.stretch)(points), fingers, _FINGER_ROOT * scale)
         thumb = self.plan.digits["thumb"].flesh(points, self.detail)
@@ -51,7 +51,7 @@ class PlannedFlesh:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Corners of a box that holds the surface [mm]."""
+        """Lower and upper corner of a box that contains the surface [mm]."""
         corners = [*PalmSlab(self.plan.stretch).corners]
         for digit in self.plan.digits.values():
             flesh = digit.flesh
@@ -63,14 +63,14 @@ class PlannedFlesh:
         return np.min(corners, axis=0) - margin, np.max(corners, axis=0) + margin
 
     def slope(self, points: Array) -> tuple[Array, Array]:
-        """Distance (n,) and its gradient (n, 3), by differences over four corners of a tetrahedron."""
+        """Distance (n,) [mm] and its gradient (n, 3), by finite differences over the corners of a tetrahedron."""
         step = 0.02
         corners = np.array([(1, -1, -1), (-1, -1, 1), (-1, 1, -1), (1, 1, 1)], dtype=np.float64)
         values = np.stack([self(points + step * corner) for corner in corners])
         return values.mean(axis=0), np.einsum("kn,kc->nc", values, corners) / (4.0 * step)
 
     def project(self, points: Array, steps: int = 3) -> Array:
-        """Nearby points of the surface, by Newton's method along the gradient."""
+        """Project points near the surface onto it by Newton steps along the gradient, shape (n, 3)."""
         for _ in range(steps):
             value, gradient = self.slope(points)
             length = np.maximum((gradient**2).sum(axis=1), 0.05)

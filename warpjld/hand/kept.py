@@ -1,4 +1,4 @@
-"""Built-in hands kept in files: building one takes seconds, reading it a few hundredths of one."""
+"""Built-in hands stored in files: building one takes seconds, reading it a few hundredths of a second."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["kept_hand"]
 
 _MODULES = ("*.py", "files/*.py", "geometry/*.py", "hand/*.py", "rig/*.py", "runtime/*.py", "skeleton/**/*.py")
-"""What building a hand runs through."""
+"""Program files that building a hand executes."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Built:
-    """All that a built-in hand's rig is made of."""
+    """Stored data of a built-in hand's rig."""
 
     skeleton: Skeleton
     vertices: NDArray[np.float64]
@@ -29,7 +29,7 @@ class _Built:
 
 
 def kept_hand(side: str = "left", **options: Any) -> Rig:
-    """``build_hand``, out of a file where the same hand was built before.
+    """``build_hand``, read from a file where the same hand was built before.
 
     Args:
         side: As of ``build_hand``, likewise ``options``.

@@ -1,4 +1,4 @@
-"""Edges, areas and neighbourhoods of a closed manifold triangulation, as arrays."""
+"""Edge connectivity, areas and neighbourhoods of a closed manifold triangulation, as arrays."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class ManifoldEdges:
     """Edges of a closed manifold: each has exactly two faces.
 
     Attributes:
-        ends: Vertices of each edge, smaller number first, shape (E, 2), in ascending order.
+        ends: Vertices of each edge, the smaller index first, shape (E, 2), in ascending order.
         faces: The two faces at each edge, shape (E, 2).
-        corners: Corner of either face where the edge starts; it runs to the following corner, shape (E, 2).
+        corners: Corner (0, 1, 2) of either face where the edge starts; it ends at the next corner, shape (E, 2).
         of_face: Edge between corners k and k + 1 of each face, shape (T, 3).
         count: Number of vertices.
     """
@@ -38,7 +38,7 @@ class ManifoldEdges:
         """Edges of triangles (T, 3) over ``count`` vertices."""
         start, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
         key = np.minimum(start, end) * count + np.maximum(start, end)
-        # a stable sort is several times slower; sorting the two equal keys of each edge serves as well
+        # a stable sort is several times slower than sorting the two equal keys of each edge afterwards
         order = np.sort(np.argsort(key).reshape(-1, 2), axis=1).ravel()
         first = key[order[::2]]
         number = np.empty(len(key), dtype=np.int64)
@@ -56,7 +56,7 @@ class ManifoldEdges:
         return np.bincount(self.ends.ravel(), minlength=self.count)
 
     def joined(self, a: Faces, b: Faces) -> NDArray[np.bool_]:
-        """Whether vertices a and b share an edge, elementwise."""
+        """Whether vertices a (n,) and b (n,) share an edge, elementwise, shape (n,)."""
         known = self.ends[:, 0] * self.count + self.ends[:, 1]
         key = np.minimum(a, b) * self.count + np.maximum(a, b)
         place = np.minimum(np.searchsorted(known, key), len(known) - 1)
@@ -71,12 +71,12 @@ class ManifoldEdges:
 
 
 def dots(a: Array, b: Array) -> Array:
-    """Scalar products of rows (n, 3), shape (n,): several times faster than a sum over so short an axis."""
+    """Scalar products of rows (n, 3), shape (n,); several times faster than a sum over so short an axis."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
 def area_normals(vertices: Array, faces: Faces) -> Array:
-    """Normals of length twice the area, shape (T, 3)."""
+    """Face normals of the length of twice the area, shape (T, 3)."""
     a, b, c = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
     return np.cross(b - a, c - a)
 
@@ -89,7 +89,7 @@ def mean_over_neighbours(edges: ManifoldEdges, values: Array) -> Array:
 
 
 def subdivide(vertices: Array, faces: Faces) -> tuple[Array, Faces]:
-    """Every triangle into four at its edges' midpoints."""
+    """Divide every triangle into four at the midpoints of its edges; vertices and faces."""
     edges = ManifoldEdges.of(faces, len(vertices))
     middle = vertices[edges.ends].mean(axis=1)
     ab, bc, ca = (edges.of_face + len(vertices)).T

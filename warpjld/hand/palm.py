@@ -1,4 +1,4 @@
-"""The palm, the wrist and the stub of the forearm: a slab whose outline and two faces are functions."""
+"""Implicit surface of the palm, the wrist and the stub of the forearm: a slab with splines as outline and faces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["PalmSlab"]
 
 Array = NDArray[np.float64]
 
-# distal place: radial edge, ulnar edge, dorsal face, palmar face, squareness [mm of the design hand]
+# rows of distal coordinate, radial edge, ulnar edge, dorsal face, palmar face [mm of the design hand], squareness
 _OUTLINE = np.array(
     [
         (-56, 31.5, -31.0, 20.0, -19.5, 0.06),
@@ -31,11 +31,11 @@ _OUTLINE = np.array(
         (125, 31.0, -36.0, -6.0, -10.0, 0.50),
     ]
 )
-# where the webs end, by radial place
+# rows of radial coordinate and distal end of the webs [mm of the design hand]
 _WEBS = np.array([(-60, 82.0), (-44, 86.0), (-27, 96.0), (-7, 106.0), (15, 107.5), (36, 103.0), (50, 98.0)])
-_CAP = 19.0  # length over which the slab closes towards the webs
-_STUB = (-52.0, -42.0)  # end of the forearm, and where its rounding begins
-# lumps of the palmar and of the dorsal face: radial and distal place, their spreads, height
+_CAP = 19.0  # length over which the slab is rounded off towards the webs
+_STUB = (-52.0, -42.0)  # distal coordinates of the forearm's end, and where its rounding begins
+# Gaussian bumps of the palmar and of the dorsal face: radial and distal position, their standard deviations, height
 _PADS = (
     (-25.0, 17.0, 14.0, 14.0, -4.0),  # hypothenar: heel
     (-28.0, 42.0, 13.0, 23.0, -4.5),  # and edge of the hand
@@ -48,12 +48,12 @@ _BONES = (
     (19.0, 56.0, 5.0, 24.0, 0.6),
     (-13.0, 52.0, 5.0, 24.0, 0.6),
 )
-_ARCH = (0.006, 0.0045)  # curvature to the radial and to the ulnar side
+_ARCH = (0.006, 0.0045)  # curvature of the dorsal face on the radial and on the ulnar side
 
 
 @dataclass(frozen=True, eq=False)
 class PalmSlab:
-    """Signed distance of the slab; ``stretch`` scales the design's axes."""
+    """Signed distance of the slab; ``stretch`` are scales of the design's axes, shape (3,)."""
 
     stretch: Array
 
@@ -79,7 +79,7 @@ class PalmSlab:
             bottom = bottom + height * np.exp(-0.5 * (((x - px) / sx) ** 2 + ((d - pd) / sd) ** 2))
         for px, pd, sx, sd, height in _BONES:
             top = top + height * np.exp(-0.5 * (((x - px) / sx) ** 2 + ((d - pd) / sd) ** 2))
-        # the knuckles lie on an arch: the dorsal face falls to both sides, more to the ulnar one
+        # transverse arch of the knuckles: the dorsal face falls to both sides, more to the ulnar one
         rise = np.clip(d / 70.0, 0.0, 1.0)
         top = top - rise * rise * (3.0 - 2.0 * rise) * (
             _ARCH[0] * np.clip(x - 18.0, 0.0, 20.0) ** 2 + _ARCH[1] * np.clip(-8.0 - x, 0.0, 38.0) ** 2

@@ -1,4 +1,4 @@
-"""Where everything in a hand of given size lies: joints, digit frames, flesh."""
+"""Layout of a hand of given size: joints, frames of the digits, and the swept solids of its flesh."""
 
 from __future__ import annotations
 
@@ -16,16 +16,22 @@ __all__ = ["Plan", "PlannedDigit", "plan_hand"]
 
 Array = NDArray[np.float64]
 
-_ROOT = 30.0  # how far a digit's flesh reaches back beyond its base joint
-_FINGER_SQUARENESS, _THUMB_SQUARENESS = 0.12, 0.10  # of sections, 0 for ellipses
+_ROOT = 30.0  # length of a digit's flesh proximal to its base joint [mm]
+_FINGER_SQUARENESS, _THUMB_SQUARENESS = 0.12, 0.10  # squareness of cross-sections, 0 for ellipses
 _CAP = 0.62  # fraction of the last phalanx where the tip's rounding begins
-_TIP = 0.62  # depth of the extremity's centre under the skin, in half-widths
-_NAIL = (0.61, 0.26, 0.58)  # middle and half-length in last phalanges, half-width in half-widths
+_TIP = 0.62  # depth of the extremity joint below the skin, in half-widths
+_NAIL = (0.61, 0.26, 0.58)  # middle and half-length in units of the last phalanx, half-width in half-widths
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedDigit:
-    """Joints of a digit (base, knuckle 2, knuckle 3, tip; shape (4, 3)), its dorsal direction at each, its flesh."""
+    """Layout of a digit.
+
+    Attributes:
+        joints: Positions of base, knuckle 2, knuckle 3 and tip [mm], shape (4, 3).
+        dorsal: Dorsal direction at each, shape (4, 3).
+        flesh: Its swept solid.
+    """
 
     joints: Array
     dorsal: Array
@@ -49,7 +55,7 @@ def plan_hand(along: float, across: float, proportions: Mapping[str, tuple[float
 
     Args:
         along: Scale of distal measures.
-        across: Scale of radial and dorsal ones, thicknesses included.
+        across: Scale of radial and dorsal measures, thicknesses included.
         proportions: Digit → (scale of its length, scale of its thickness).
     """
     stretch = np.array([across, across, along])
@@ -95,14 +101,26 @@ def _digit(
     base: Array, steps: Array, lengths: Array, up: Array, half: float,
     profile: tuple[tuple[float, ...], ...], root: float, squareness: float,
 ) -> PlannedDigit:  # fmt: skip
+    """Lay out a digit.
+
+    Args:
+        base: Base joint [mm], shape (3,).
+        steps: Directions of the three segments, shape (3, 3).
+        lengths: Their lengths, the last to the skin [mm], shape (3,).
+        up: Dorsal direction, shape (3,).
+        half: Half-width [mm], the unit of the profile.
+        profile: Rows as of ``design.FINGER_PROFILE``.
+        root: Length of the flesh proximal to the base joint [mm].
+        squareness: Squareness of its cross-sections.
+    """
     joints = base + np.vstack([np.zeros(3), np.cumsum(steps * lengths[:, None], axis=0)])
     skin = joints[3].copy()
-    joints[3] = skin - steps[2] * _TIP * half  # the extremity's centre lies inside the skin
+    joints[3] = skin - steps[2] * _TIP * half  # the extremity joint lies inside the skin
     axis = unit(skin - base)
     dorsal = _square(up, axis)
     frame = np.vstack([np.cross(dorsal, axis), dorsal, axis])
     local = (np.vstack([joints[:3], skin]) - base) @ frame.T
-    stops = np.concatenate([[-root], local[:, 2]])  # of joint numbers -1, 0, 1, 2, 3
+    stops = np.concatenate([[-root], local[:, 2]])  # axial coordinates of the profile's joints -1, 0, 1, 2, 3
     sizes = [
         (stops[int(j) + 1] + f * (stops[int(j) + 2] - stops[int(j) + 1]), half * w, half * d, half * p)
         for j, f, w, d, p in profile
@@ -125,6 +143,7 @@ def _digit(
 
 
 def _spindle(start: Array, end: Array, profile: tuple[tuple[float, ...], ...], across: float) -> Sweep:
+    """Swept solid of a muscle between two points [mm], its profile's measures scaled by ``across``."""
     length = float(np.linalg.norm(end - start))
     axis = (end - start) / length
     palmar = _square(np.array([0.0, -1.0, 0.0]), axis)
@@ -140,5 +159,5 @@ def _spindle(start: Array, end: Array, profile: tuple[tuple[float, ...], ...], a
 
 
 def _square(vector: Array, axis: Array) -> Array:
-    """The part of a vector square to an axis, of length one."""
+    """Unit vector along the component of a vector perpendicular to an axis."""
     return unit(vector - axis * (vector @ axis) / (axis @ axis))

@@ -1,8 +1,8 @@
-"""Isotropic remeshing on an implicit surface (after Botsch and Kobbelt 2004), many operations at a time.
+"""Isotropic remeshing on an implicit surface (after Botsch and Kobbelt 2004), vectorised over independent operations.
 
-Each pass takes a set of operations that do not touch one another, so that it is a few array expressions: long edges
-split, short ones collapse, edges flip to Delaunay, vertices move to the mean of their neighbours along the surface.
-Ranks decide which operation goes first and ties go by number: the same input gives the same bits.
+Each pass applies a set of operations that do not affect one another, so that it is a few array expressions: long edges
+are split, short ones collapsed, edges flipped towards Delaunay, and vertices moved tangentially to the mean of their
+neighbours. Priorities are deterministic, with ties broken by index: the same input gives the same result to the bit.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ __all__ = ["remesh", "settle"]
 
 Array = NDArray[np.float64]
 
-_LONG, _SHORT = 4.0 / 3.0, 4.0 / 5.0  # of the edge length wanted: Botsch and Kobbelt 2004
-_COLLAPSES = 8  # passes a round: one takes few edges, since edges near one another exclude each other
+_LONG, _SHORT = 4.0 / 3.0, 4.0 / 5.0  # relative to the target edge length: Botsch and Kobbelt 2004
+_COLLAPSES = 8  # collapse passes in a round: one pass collapses few edges, since neighbouring ones exclude each other
 
 
 def remesh(
     vertices: Array, faces: Faces, size: Array, field: Callable[[Array], Array], rounds: int
 ) -> tuple[Array, Faces, Array]:
-    """Triangles of the wanted edge lengths.
+    """Remesh a surface to target edge lengths.
 
     Args:
         vertices, faces: A closed manifold on the surface.
-        size: Wanted edge length at each vertex, shape (V,).
-        field: Signed distance whose zero level the vertices stay on.
+        size: Target edge length at each vertex, shape (V,).
+        field: Signed distance on whose zero level the vertices are kept.
         rounds: Number of rounds of split, collapse, flip and smoothing.
 
     Returns:
-        Vertices, faces and the wanted lengths at the new vertices.
+        Vertices, faces, and the target lengths at the new vertices.
     """
     for _ in range(rounds):
         vertices, faces, size = _split(vertices, faces, size)
@@ -49,7 +49,8 @@ def remesh(
 
 
 def settle(vertices: Array, faces: Faces, size: Array, field: Callable[[Array], Array], amount: float = 0.7) -> Array:
-    """Vertices moved along the surface towards the mean of their neighbours, smaller triangles weighing more."""
+    """Tangential smoothing: vertices moved towards the mean of their neighbours, weighted by 1 / target length, and
+    back onto the zero level of ``field``, shape (V, 3)."""
     edges = ManifoldEdges.of(faces, len(vertices))
     normals = area_normals(vertices, faces)
     ring = np.zeros((len(vertices), 3))
@@ -66,6 +67,7 @@ def settle(vertices: Array, faces: Faces, size: Array, field: Callable[[Array], 
 
 
 def _split(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces, Array]:
+    """Split edges that are too long, and the longest of both their faces, at their midpoints."""
     edges = ManifoldEdges.of(faces, len(vertices))
     ratio = _ratios(vertices, size, edges)
     longest = edges.of_face[np.arange(len(faces)), np.argmax(ratio[edges.of_face], axis=1)]
@@ -86,6 +88,7 @@ def _split(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces, Ar
 
 
 def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces, Array]:
+    """Collapse edges that are too short to their midpoints, where no face flips and no edge becomes too long."""
     count = len(vertices)
     edges = ManifoldEdges.of(faces, count)
     ratio = _ratios(vertices, size, edges)
@@ -96,7 +99,7 @@ def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces,
     short = np.flatnonzero(wanted)
     rank[short[np.argsort(ratio[short], kind="stable")]] = np.arange(len(short))
     chosen = short[_apart(edges, rank)[short]]
-    # two ends may share only the two vertices across their edge, or the collapse would pinch the surface
+    # link condition: the ends may share only the two vertices opposite to the edge, or the result is not manifold
     ring = edges.adjacency
     a, b = edges.ends[chosen].T
     chosen = chosen[(ring[a].multiply(ring[b])).sum(axis=1) == 2]
@@ -136,7 +139,8 @@ def _collapse(vertices: Array, faces: Faces, size: Array) -> tuple[Array, Faces,
 
 
 def _apart(edges: ManifoldEdges, rank: Faces) -> Faces:
-    """Edges whose rank is the lowest around either end and around the neighbours of either end."""
+    """Which edges have the lowest rank among all edges at their ends and at the neighbours of their ends, shape (E,);
+    these can be collapsed independently."""
     lowest = np.full(edges.count, rank.max() + 1)
     for k in range(2):
         np.minimum.at(lowest, edges.ends[:, k], rank)
@@ -147,6 +151,7 @@ def _apart(edges: ManifoldEdges, rank: Faces) -> Faces:
 
 
 def _flip(vertices: Array, faces: Faces) -> Faces:
+    """Flip edges that are not Delaunay (opposite angles sum to more than π), where the surface is nearly flat."""
     edges = ManifoldEdges.of(faces, len(vertices))
     (a, b), (c, d) = edges.ends.T, edges.opposite(faces).T
     surplus = -(_cosine(vertices, c, a, b) + _cosine(vertices, d, a, b))
@@ -163,7 +168,7 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
     start, end = faces[first, corner], faces[first, (corner + 1) % 3]
     up, down = edges.opposite(faces)[chosen].T
     one, two = np.column_stack([start, down, up]), np.column_stack([down, end, up])
-    # both new faces must keep facing the way the old ones did
+    # both new faces must have the orientation of the old ones
     facing = normals[first] + normals[second]
     fine = np.ones(len(chosen), dtype=bool)
     for new in (one, two):
@@ -172,7 +177,7 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
     pair = np.minimum(up, down) * edges.count + np.maximum(up, down)
     only = np.zeros(len(chosen), dtype=bool)
     only[np.unique(pair, return_index=True)[1]] = True
-    # flips that would crowd one vertex are left for the next pass
+    # flips that would leave a vertex with fewer than three edges wait for the next pass
     busy = np.zeros(edges.count, dtype=np.int64)
     np.add.at(busy, np.column_stack([start, end])[fine & only].ravel(), 1)
     fine &= only & (valence[start] - busy[start] >= 3) & (valence[end] - busy[end] >= 3)
@@ -182,11 +187,13 @@ def _flip(vertices: Array, faces: Faces) -> Faces:
 
 
 def _ratios(vertices: Array, size: Array, edges: ManifoldEdges) -> Array:
+    """Length of every edge relative to the target length, shape (E,)."""
     a, b = edges.ends.T
     along = vertices[a] - vertices[b]
     return np.sqrt(dots(along, along)) / (0.5 * (size[a] + size[b]))
 
 
 def _cosine(vertices: Array, apex: Faces, a: Faces, b: Faces) -> Array:
+    """Cosine of the angle at ``apex`` between a and b, shape (n,)."""
     u, v = vertices[a] - vertices[apex], vertices[b] - vertices[apex]
     return dots(u, v) / np.maximum(np.sqrt(dots(u, u) * dots(v, v)), 1e-12)

@@ -1,7 +1,7 @@
-"""A digit as a swept section: a straight axis, a curved centre line beside it, and half-widths along it.
+"""Implicit surface of a digit by sweeping a cross-section along a curved centre line.
 
-Sections are cut square to one straight axis and shifted to the centre line. So a point's section is found by a dot
-product, smooth everywhere, and a bent digit has none of the creases that projecting on a polyline makes.
+Cross-sections are perpendicular to one straight axis and shifted to the centre line. So a point's section is found by a
+dot product, smooth everywhere, and a bent digit has none of the creases that projection on a polyline makes.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ __all__ = ["FAR", "Sweep", "section_distance"]
 
 Array = NDArray[np.float64]
 
-_ROWS = 512  # of the tables along the axis: errors of the interpolation stay below a micrometre
-FAR = 40.0  # millimetres: beyond every blending radius, also in a giant's hand
-_CENTROID = 4.0 / (3.0 * np.pi)  # of a half ellipse, in half-heights
+_ROWS = 512  # rows of the tables along the axis: errors of the interpolation stay below a micrometre
+FAR = 40.0  # largest distance that is computed [mm], beyond every blending radius
+_CENTROID = 4.0 / (3.0 * np.pi)  # height of a half ellipse's centroid, in half-heights
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Signed distance, exact to first order at the surface, of a digit.
+    """Signed distance [mm] of a swept solid, exact to first order at the surface.
 
     Attributes:
-        origin: Where the axis starts to count, shape (3,).
-        frame: Rows: lateral, dorsal and axial direction, shape (3, 3).
-        ends: Axial coordinate of the closed ends.
-        caps: Axial coordinate where the rounding of either end begins.
+        origin: Origin of the axis [mm], shape (3,).
+        frame: Lateral, dorsal and axial direction as rows, shape (3, 3).
+        ends: Axial coordinates of the closed ends [mm].
+        caps: Axial coordinates where the rounding of either end begins [mm].
         squareness: 0 for elliptic sections, towards 1 for rectangular ones.
-        nail: Axial coordinate of the nail's middle, its half-length and half-width, if the digit has one.
-        table: Per row along the axis: centre (lateral, dorsal), half-width, dorsal and palmar half-height, (n, 5).
+        table: Centre (lateral, dorsal), half-width, dorsal and palmar half-height along the axis [mm], shape (n, 5).
+        nail: Axial coordinate of the nail's middle, its half-length and half-width [mm], if there is one.
     """
 
     origin: Array
@@ -57,29 +57,27 @@ class Sweep:
         profile: Sequence[tuple[float, float, float, float]],
         nail: tuple[float, float, float] | None = None,
     ) -> Sweep:
-        """Sweep whose sections have their centroids on a spline.
+        """Swept solid whose sections have their centroids on a natural cubic spline.
 
         Args:
             origin: As of the class; likewise ``frame``, ``ends``, ``caps``, ``squareness`` and ``nail``.
-            centres: (axial coordinate, lateral, dorsal) of centroids to pass through.
-            profile: (axial coordinate, half-width, dorsal half-height, palmar half-height).
+            centres: Centroids that the spline passes through: axial, lateral, dorsal coordinate [mm].
+            profile: Sizes: axial coordinate, half-width, dorsal half-height, palmar half-height [mm].
         """
         along = np.linspace(*ends, _ROWS)
         centre, sizes = np.array(centres), np.array(profile)
         line = CubicSpline(centre[:, 0], centre[:, 1:], bc_type="natural")(along)
         inside = np.clip(along, sizes[0, 0], sizes[-1, 0])
         half = CubicSpline(sizes[:, 0], sizes[:, 1:], bc_type="natural")(inside)
-        line[:, 1] -= _CENTROID * (half[:, 1] - half[:, 2])  # unequal halves: keep the centroid, move their border
+        line[:, 1] -= _CENTROID * (half[:, 1] - half[:, 2])  # halves of unequal height: keep the section's centroid
         return cls(origin, frame, ends, caps, squareness, np.column_stack([line, half]), nail)
 
     def __call__(self, points: Array, detail: float = 0.0) -> Array:
-        """Signed distance of points (n, 3), negative inside, shape (n,).
-
-        Points farther than ``FAR`` get just that: they do not pay for what nobody will read.
+        """Signed distance of points [mm], negative inside, shape (n,); ``FAR`` for those farther than that.
 
         Args:
-            points: Positions, shape (n, 3).
-            detail: 0…1, how deep the nail is engraved.
+            points: Positions [mm], shape (n, 3).
+            detail: Relative depth of the nail's relief, 0…1.
         """
         local = (points - self.origin) @ self.frame.T
         low, high = self._box
@@ -92,12 +90,14 @@ class Sweep:
 
     @cached_property
     def _box(self) -> tuple[Array, Array]:
+        """Lower and upper corner of the solid's box in its own frame, enlarged by ``FAR`` [mm]."""
         cu, cv, width, dorsal, palmar = self.table.T
         low = np.array([(cu - width).min(), (cv - palmar).min(), self.ends[0]])
         high = np.array([(cu + width).max(), (cv + dorsal).max(), self.ends[1]])
         return low - FAR, high + FAR
 
     def _distance(self, local: Array, detail: float) -> Array:
+        """Signed distance of points in the solid's own frame."""
         s = local[:, 2]
         low, high = self.ends
         place = np.clip((s - low) * ((_ROWS - 1) / (high - low)), 0.0, _ROWS - 1.001)
@@ -114,14 +114,14 @@ class Sweep:
         return out
 
     def _fold(self, u: Array, height: Array, s: Array) -> Array:
-        """Depth of the fold around the nail, and the nail standing a little above it."""
+        """Relief of the nail [mm], positive inwards: the fold of skin around it, less the raised nail plate."""
         assert self.nail is not None
         middle, half_length, half_width = self.nail
         along = (s - middle) / half_length
         rim = np.sqrt(np.sqrt((u / half_width) ** 4 + along**4))
         away = (rim - 1.0) * half_width
         upper = np.clip(2.5 * height, 0.0, 1.0)
-        free = 0.5 + 0.5 * np.tanh(4.0 * (along - 0.55))  # the nail's free edge has no fold
+        free = 0.5 + 0.5 * np.tanh(4.0 * (along - 0.55))  # less fold at the nail's free edge
         fold = 0.045 * half_width * np.exp(-((away / (0.10 * half_width)) ** 2)) * (1.0 - 0.7 * free)
         plate = 0.02 * half_width / (1.0 + np.exp(np.clip(away / (0.05 * half_width), -30.0, 30.0)))
         return upper * upper * (3.0 - 2.0 * upper) * (fold - plate)
@@ -130,7 +130,7 @@ class Sweep:
 def section_distance(
     u: Array, v: Array, beyond: Array, width: Array, height: Array, length: Array | float, squareness: Array | float
 ) -> Array:
-    """Approximate distance to |(u / width, v / height)| = 1, closed where ``beyond`` reaches 1.
+    """Approximate distance to the surface of section |(u / width, v / height)| = 1, closed where ``beyond`` is 1.
 
     Sections are squircles a² + b² − κ a² b² = 1, which need no powers; ``beyond`` enters with exponent 2.5 so that
     curvature is continuous where a cap begins.

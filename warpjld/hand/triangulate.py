@@ -1,4 +1,4 @@
-"""The hand's flesh as even triangles, from about two thousand vertices to millions."""
+"""Isotropic triangulation of the hand's implicit surface, from about two thousand vertices to millions."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["triangulate"]
 
 Array = NDArray[np.float64]
 
-_LARGEST_REMESHED = 16_000  # vertices; beyond, a remeshed surface is subdivided: far faster, and as even
-_COARSEST, _FINEST = 2.0, 1.0  # grid spacing [mm]: two millimetres still tell neighbouring fingers apart
-_PACKING = 0.96  # wanted length squared times vertices per area, in a remeshed surface (equilateral: 2 / √3 = 1.15)
+_LARGEST_REMESHED = 16_000  # vertices; larger surfaces are remeshed at this size and subdivided, which is far faster
+_COARSEST, _FINEST = 2.0, 1.0  # grid spacing [mm]: two millimetres still separate neighbouring fingers
+_PACKING = 0.96  # target length squared times vertices per area, in a remeshed surface (equilateral: 2 / √3 = 1.15)
 
 
 def triangulate(flesh: PlannedFlesh, resolution: int) -> tuple[Array, Faces]:
-    """Vertices [mm] on the surface and its triangles, about ``resolution`` vertices; closed, of genus 0."""
+    """Triangulate the surface with about ``resolution`` vertices: vertices [mm] and faces, closed, of genus 0."""
     base, halvings = resolution, 0
     while base > _LARGEST_REMESHED:
         base, halvings = base // 4, halvings + 1
@@ -42,27 +42,34 @@ def triangulate(flesh: PlannedFlesh, resolution: int) -> tuple[Array, Faces]:
         size = size * np.sqrt(excess)
     for _ in range(3):
         vertices = settle(vertices, faces, size, flesh)
-    # details finer than the triangles would only be noise
+    # no details finer than the triangles, which would be noise
     flesh = replace(flesh, detail=float(np.clip((resolution - 8_000) / 24_000, 0.0, 1.0)))
     vertices = flesh.project(vertices, steps=2)
     for halving in range(halvings):
         vertices, faces = subdivide(vertices, faces)
-        vertices = flesh.project(vertices, steps=2 if halving == 0 else 1)  # later midpoints lie on it almost
+        vertices = flesh.project(vertices, steps=2 if halving == 0 else 1)  # later midpoints are nearly on the surface
     return vertices, faces
 
 
 def _closed_contour(flesh: PlannedFlesh, base: int) -> tuple[Array, Faces]:
+    """Contour of the surface as a single closed piece without holes, on a finer grid where that needs one.
+
+    Raises:
+        InputError: The proportions give no such surface.
+    """
     spacing = float(np.clip(np.sqrt(40_000.0 / base), _FINEST, _COARSEST) * flesh.plan.stretch.min())
     for _ in range(3):
         vertices, faces = contour(flesh, *flesh.bounds, spacing)
-        if len(vertices) - len(faces) // 2 == 2:  # Euler's number of a sphere: in one piece, without holes
+        if len(vertices) - len(faces) // 2 == 2:  # Euler characteristic of a sphere
             return vertices, faces
         spacing *= 0.7
-    raise InputError("proportions: with these the fingers touch one another, or the hand falls to pieces")
+    raise InputError(
+        "proportions: with these the hand is not one closed surface (fingers merge, or parts are separate)"
+    )
 
 
 def _relative_size(flesh: PlannedFlesh, vertices: Array, faces: Faces) -> Array:
-    """Wanted edge lengths up to a factor: shorter where the surface bends more, shape (V,)."""
+    """Target edge lengths up to a common factor, smaller where the curvature is larger, shape (V,)."""
     normal = unit(flesh.slope(vertices)[1])
     edges = ManifoldEdges.of(faces, len(vertices))
     a, b = edges.ends.T

@@ -1,4 +1,4 @@
-"""A shaded mesh inside a window whose vertices move while everything else stays."""
+"""A shaded mesh of constant topology inside a window, whose vertices and colours change by frame."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ MATTE: dict[str, float] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.0}
 
 
 class RenderedBody:
-    """Split along creases once; then placed and painted frame by frame.
+    """A mesh that is split along creases once, then positioned and coloured for every frame.
 
     Args:
-        vertices: Positions in the first frame, which tells the creases, shape (n, 3).
+        vertices: Positions in the first frame, by which creases are found [m], shape (n, 3).
         faces: Triangles, shape (t, 3).
-        crease: Edges of a larger dihedral angle [rad] are shown as edges.
+        crease: Dihedral angle [rad] above which an edge is shown as sharp.
     """
 
     def __init__(self, vertices: NDArray[np.floating], faces: NDArray[np.integer], crease: float) -> None:
@@ -35,13 +35,19 @@ class RenderedBody:
         self._mesh.point_data.active_normals_name = "Normals"
 
     def show(self, plotter: Any, color: str | NDArray[np.uint8], **look: Any) -> None:
-        """Add it in one colour; or in a table of colours, shape (n, 3), that shares given by `paint` go through."""
+        """Add the mesh to a plotter.
+
+        Args:
+            plotter: A pyvista plotter.
+            color: One colour, or a table of colours, shape (n, 3), to which the shares given to `paint` refer.
+            look: Further options of ``Plotter.add_mesh``.
+        """
         colored: dict[str, Any] = {"color": color}
         if not isinstance(color, str):
             from matplotlib.colors import ListedColormap
 
             self.paint(np.zeros(int(self._shading.origin.max()) + 1))
-            # shares are interpolated, not colours: between grey and red comes orange
+            # scalars are interpolated, not colours, so that intermediate values get the table's colours
             colored = {"scalars": "share", "clim": (0.0, 1.0), "cmap": ListedColormap(color / 255.0)}
             colored |= {"n_colors": len(color), "interpolate_before_map": True, "show_scalar_bar": False}
         # pyvista's own smooth shading would compute other normals
@@ -49,7 +55,7 @@ class RenderedBody:
         actor.prop.interpolation = "Phong"
         if isinstance(color, str):
             red, green, blue = actor.prop.color.float_rgb
-            # light that has gone through skin is warmer
+            # warmer ambient light imitates subsurface scattering in skin
             actor.prop.ambient_color = (red, 0.84 * green, 0.78 * blue)
 
     def show_painted(self, plotter: Any, colors: NDArray[np.uint8], **look: Any) -> None:
@@ -59,7 +65,7 @@ class RenderedBody:
         actor.prop.interpolation = "Phong"
 
     def place(self, vertices: NDArray[np.floating]) -> None:
-        """Move the vertices, shape (n, 3)."""
+        """Move the vertices to positions [m], shape (n, 3)."""
         self._mesh.points, self._mesh.point_data["Normals"] = self._shading.place(vertices)
 
     @property
@@ -69,5 +75,5 @@ class RenderedBody:
         return np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3)
 
     def paint(self, shares: NDArray[np.floating]) -> None:
-        """Colour the vertices, shape (n,): 0 is the table's first colour, 1 its last."""
+        """Colour the vertices by shares, shape (n,): 0 is the table's first colour, 1 its last."""
         self._mesh.point_data["share"] = shares[self._shading.origin]

@@ -1,4 +1,4 @@
-"""Where a picture is taken from: named views of a hand or a body, framed once for all frames of a film."""
+"""Perspective camera with named views of a hand or a body, framed once for all frames of a film."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class Camera:
     """A perspective camera.
 
     Attributes:
-        position: The eye [m].
-        target: What it looks at [m].
+        position: Position of the eye [m].
+        target: Point at the centre of the picture [m].
         up: Direction that points up in the picture.
-        angle: Vertical opening [rad]; small angles distort little.
-        zoom: Above 1 makes the picture's content larger.
+        angle: Vertical field of view [rad]; small angles distort little.
+        zoom: Magnification of the picture's content.
     """
 
     position: tuple[float, float, float]
@@ -85,15 +85,15 @@ class Camera:
         Args:
             name: A key of `VIEWS`: palmar, dorsal, radial, ulnar, tips and three-quarter for hands; front, back,
                 left, right (the subject's own) and top for bodies.
-            points: What must be in the picture [m], any shape (…, 3). Pass the vertices of all frames of a film
-                (or the corners of their bounding box), so that it does not jump.
-            forward: Where the palm, or the face of a body, looks to.
-            up: From the wrist to the fingers, or from the feet to the head; made square to ``forward``.
-            side: Which hand it is: tells where the thumb is.
-            size: Width and height of the picture, for its proportions.
-            zoom: Above 1 comes closer, and crops.
+            points: Points that must be visible [m], shape (…, 3). Pass the vertices of all frames of a film (or the
+                corners of their bounding box), so that the view does not change between frames.
+            forward: Direction that the palm, or the face of a body, faces.
+            up: From the wrist to the fingers, or from the feet to the head; made perpendicular to ``forward``.
+            side: Which hand it is, which determines the thumb's side.
+            size: Width and height of the picture, for its aspect ratio.
+            zoom: Magnification; above 1 the view is cropped.
             margin: Empty border, as a share of the picture.
-            angle: Vertical opening [rad].
+            angle: Vertical field of view [rad].
 
         Raises:
             InputError: Unknown name, no points, or axes that are parallel.
@@ -124,7 +124,7 @@ class Camera:
         return replace(self, zoom=self.zoom * zoom)
 
     def turned(self, angle: float) -> Self:
-        """The camera carried round its target about ``up`` [rad], for turntables."""
+        """The camera rotated about its target around ``up`` by an angle [rad], for turntables."""
         axis = unit(self.up)
         arm = np.subtract(self.position, self.target)
         arm = (
@@ -134,13 +134,13 @@ class Camera:
 
 
 def _axes(forward: ArrayLike, up: ArrayLike, side: str | None) -> NDArray[np.float64]:
-    """Rows: towards the thumb (the viewer's right without a hand), up, forward; orthonormal."""
+    """Orthonormal axes as rows: towards the thumb (to the viewer's right for bodies), up, forward."""
     front, above = np.array(forward, float), np.array(up, float)
     front /= max(float(np.linalg.norm(front)), 1e-300)
     above = above - (above @ front) * front
     if not np.linalg.norm(above) > 1e-9:
         raise InputError("camera: forward and up must be two different directions")
     above = unit(above)
-    # seen palm first with its fingers up, a left hand has its thumb on the left
+    # seen from the palm with its fingers up, a left hand has its thumb on the left
     thumb = np.cross(above, front) * (-1 if side == "left" else 1)
     return np.stack([thumb, above, front])

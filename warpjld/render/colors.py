@@ -1,4 +1,4 @@
-"""Numbers as colours, and the bar that explains them."""
+"""Colour scales for numbers, with colour bars, and names of colours."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["ColorScale", "as_hex"]
 
 
 def as_hex(color: str) -> str:
-    """A colour as ``#rrggbb``: from a name as the web has them, in any case, or ``#rgb``, ``#rrggbb``.
+    """A colour as ``#rrggbb``, from a CSS name in any case, or ``#rgb``, ``#rrggbb``.
 
     Raises:
         InputError: There is no such colour.
@@ -33,15 +33,15 @@ def as_hex(color: str) -> str:
 
 @dataclass(frozen=True)
 class ColorScale:
-    """A colour for every number between two limits; numbers beyond take the end's colour.
+    """Map of numbers between two limits to colours; numbers beyond a limit get its colour.
 
     Attributes:
         low: Number of the first colour.
         high: Number of the last colour.
-        title: What the numbers are, with their unit.
-        colormap: Matplotlib's name of the colours, or colours to go through.
-        factor: Multiplies the numbers where they are written, e.g. 1000 for metres shown in mm.
-        highest: Whether the last number is written too, round or not.
+        title: Quantity and unit.
+        colormap: Name of a Matplotlib colour map, or colours to interpolate between.
+        factor: Factor of the numbers on the bar, e.g. 1000 for metres shown in mm.
+        highest: Whether ``high`` is written on the bar even if it is not a round number.
     """
 
     low: float
@@ -75,11 +75,11 @@ class ColorScale:
         return self.table()[np.rint(np.clip(self.shares(values), 0, 1) * 255).astype(int)]
 
     def shares(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
-        """How far numbers (n,) are from ``low`` to ``high``."""
+        """Position of numbers (n,) between ``low`` (0) and ``high`` (1), shape (n,)."""
         return np.asarray((values - self.low) / (self.high - self.low), np.float64)
 
     def drawn_on(self, picture: NDArray[np.uint8], ink: str) -> NDArray[np.uint8]:
-        """The picture with a bar, round numbers and the title at its right border."""
+        """The picture with a colour bar, its numbers and the title at the right border."""
         from PIL import Image
 
         from warpjld.render.text import write
@@ -93,15 +93,18 @@ class ColorScale:
         canvas.paste(Image.fromarray(np.repeat(ramp[:, None], bar_width, axis=1)), (left, top))
         for number in self.ticks(apart=1.3 * size / bar_height):
             y = top + bar_height * (1 - (number - self.low) / (self.high - self.low))
-            text = f"{number * self.factor:.3g}"  # with a hyphen: the built-in font has no minus sign
+            text = f"{number * self.factor:.3g}"  # with a hyphen, since the built-in font has no minus sign
             write(canvas, (left + bar_width + 0.5 * size, y), text, size=size, color=ink, anchor="lm")
         if self.title:
             write(canvas, (width - 0.8 * size, top - 1.4 * size), self.title, size=size, color=ink, anchor="rm")
         return np.asarray(canvas)
 
     def ticks(self, apart: float = 0.0) -> NDArray[np.float64]:
-        """Numbers to write beside the bar: four to eight, round as they are written; and the highest where it is asked
-        for, without those nearer to it than this share of the bar."""
+        """Numbers to write beside the bar: four to eight round ones; with ``highest`` also ``high``.
+
+        Args:
+            apart: Share of the bar within which other numbers near ``high`` are left out then.
+        """
         low, high = sorted((self.low * self.factor, self.high * self.factor))
         rough = (high - low) / 7.0
         power = 10.0 ** np.floor(np.log10(rough))

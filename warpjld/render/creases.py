@@ -1,4 +1,4 @@
-"""Split a mesh along its sharp edges, so that smooth shading does not smear across them."""
+"""Splitting of a mesh along its sharp edges, so that smooth shading does not interpolate normals across them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,16 @@ __all__ = ["Shading"]
 
 
 class Shading:
-    """A copy of a mesh whose vertices are doubled along creases; made once, used for every frame.
+    """A copy of a mesh whose vertices are duplicated along creases; made once, used for every frame.
+
+    Args:
+        vertices: Positions by which creases are found [m], shape (V, 3).
+        faces: Triangles, shape (T, 3).
+        angle: Dihedral angle [rad] above which an edge is a crease.
 
     Attributes:
         faces: Triangles over the split vertices, shape (T, 3).
-        origin: Vertex of the mesh each split vertex comes from, shape (n,).
+        origin: Vertex of the mesh that each split vertex was made from, shape (n,).
     """
 
     def __init__(self, vertices: NDArray[np.floating], faces: NDArray[np.integer], angle: float) -> None:
@@ -25,18 +30,18 @@ class Shading:
         normals = np.cross(b - a, c - a)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
         corners = np.arange(3 * len(faces)).reshape(-1, 3)
-        # the directed edge of a face meets the neighbour that has it the other way round
+        # match each directed edge with the opposite one of the neighbouring face
         tails, heads = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
         flat = faces.ravel().astype(np.int64)
         count = int(flat.max()) + 1
         forth, back = flat[tails] * count + flat[heads], flat[heads] * count + flat[tails]
         order = np.argsort(forth)
         place = order[np.minimum(np.searchsorted(forth, back, sorter=order), len(order) - 1)]
-        soft = (forth[place] == back) & (
+        smooth = (forth[place] == back) & (
             np.einsum("ij,ij->i", normals[tails // 3], normals[place // 3]) > np.cos(angle)
         )
-        ones = np.concatenate([tails[soft], heads[soft]])
-        others = np.concatenate([heads[place[soft]], tails[place[soft]]])
+        ones = np.concatenate([tails[smooth], heads[smooth]])
+        others = np.concatenate([heads[place[smooth]], tails[place[smooth]]])
         links = coo_array((np.ones(len(ones)), (ones, others)), shape=(len(flat),) * 2)
         label = connected_components(links, directed=False)[1]
         kept, first = np.unique(label, return_index=True)
@@ -45,6 +50,6 @@ class Shading:
         assert len(kept) == label.max() + 1
 
     def place(self, vertices: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Positions and normals of the split vertices, each of shape (n, 3)."""
+        """Positions and normals of the split vertices, shape (n, 3) each, from positions of the mesh's."""
         points = vertices[self.origin]
         return points.astype(np.float32), vertex_normals(points, self.faces)

@@ -1,4 +1,4 @@
-"""Picture files, written beside their place and renamed when complete."""
+"""Picture files, written atomically: to a temporary file that is renamed when complete."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP", ".t
 
 
 def save_picture(path: str | Path, picture: NDArray[np.uint8]) -> Path:
-    """Write a picture (height, width, 3); its suffix chooses the format. Its folder is made if missing.
+    """Write a picture (height, width, 3) in the format of its suffix. Its folder is made if missing.
 
     Raises:
-        InputError: Unknown suffix, or a place that cannot be written.
+        InputError: Unknown suffix, or a file that cannot be written.
     """
     from PIL import Image
 

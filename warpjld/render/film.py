@@ -1,4 +1,4 @@
-"""Films: pictures appended one by one, encoded as they come."""
+"""Film files: pictures are appended one by one, and encoded as they come."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from warpjld.files.whole_file import part_of
 __all__ = ["Film"]
 
 _SLOWEST, _SLOWEST_GIF, _FASTEST = 0.01, 0.002, 1000.0
-"""Frames a second: ffmpeg knows two digits, GIF lets a picture stand for 655 s."""
+"""Frame rates [1/s]: the lowest for ffmpeg (two decimals), for GIF (655 s per picture at most), and the highest."""
 _PILLOW = {".gif": "GIF", ".webp": "WEBP"}
 _FFMPEG = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
 
@@ -27,9 +27,9 @@ _FFMPEG = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
 class Film:
     """A film being written; use it in a ``with`` statement.
 
-    ``.mp4``, ``.mov`` and ``.mkv`` (H.264) need the extra ``film`` and stream; ``.gif`` and ``.webp`` need nothing
-    more but hold their compressed frames until the end. A film appears at its place when it is complete: after an
-    exception nothing is left.
+    ``.mp4``, ``.mov`` and ``.mkv`` (H.264) need the extra ``film`` and are encoded as frames come; ``.gif`` and
+    ``.webp`` need no extra, but keep their frames in memory until the end. The file appears when it is complete: after
+    an exception none is left.
 
     >>> with Film("hand.mp4", rate=25) as film, Scene(faces, camera) as scene:   # doctest: +SKIP
     ...     for vertices in frames:
@@ -43,7 +43,7 @@ class Film:
         frames: Pictures appended so far.
 
     Raises:
-        InputError: Unknown suffix, a rate that is not above 0, or (on entering) a place that cannot be written.
+        InputError: Unknown suffix, a rate out of range, or (on entering) a file that cannot be written.
         MissingExtraError: On entering, if the encoder is not installed.
     """
 
@@ -66,7 +66,7 @@ class Film:
         """Add a frame, uint8 (height, width, 3), of the first one's size.
 
         Raises:
-            InputError: Another size or type, or the disk refuses.
+            InputError: Another size or type, or the file cannot be written.
             WarpjldError: Outside of the film's ``with`` statement.
         """
         if not self._open:
@@ -84,7 +84,7 @@ class Film:
         suffix = self.path.suffix.lower()
         with self._disk():
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._part.touch()  # a place that cannot be written shows now, not after an hour of drawing
+            self._part.touch()  # fails now where the file cannot be written, not after an hour of drawing
         try:
             if suffix in _FFMPEG:
                 self._encoder = _Ffmpeg(self._part, self.rate, _FFMPEG[suffix])
@@ -102,7 +102,7 @@ class Film:
         self._open = False
         try:
             if kind is None and self.frames == 0:
-                raise InputError("a film wants at least one picture", path=self.path)
+                raise InputError("film: want at least one picture, got none", path=self.path)
             with self._disk():
                 self._encoder.close(kind is None)
                 if kind is None:
@@ -113,6 +113,7 @@ class Film:
 
     @contextmanager
     def _disk(self) -> Iterator[None]:
+        """Report errors of the operating system as InputErrors that name the file."""
         try:
             yield
         except OSError as error:
@@ -120,8 +121,8 @@ class Film:
 
 
 class _Ffmpeg:
-    """H.264 through the ffmpeg program that imageio-ffmpeg brings; run here, since only its exit code and its own words
-    tell whether a film is whole."""
+    """H.264 encoder: the ffmpeg program of imageio-ffmpeg, run as a subprocess, since only its exit code and its
+    messages show whether a film is complete."""
 
     def __init__(self, path: Path, rate: float, container: str) -> None:
         try:
@@ -131,18 +132,18 @@ class _Ffmpeg:
         try:
             self._program = get_ffmpeg_exe()
         except RuntimeError as error:
-            raise InputError(f"the ffmpeg program is not there: {error}", path=path) from error
+            raise InputError(f"the ffmpeg program was not found: {error}", path=path) from error
         self._path, self._rate, self._container = path, rate, container
         self._running: subprocess.Popen[bytes] | None = None
-        self._said: IO[bytes] | None = None
+        self._output: IO[bytes] | None = None
 
     def add(self, picture: NDArray[np.uint8]) -> None:
-        # H.264 stores colour for squares of 2 × 2 pixels
+        # with yuv420p both sides must be even
         even = np.pad(picture, ((0, picture.shape[0] % 2), (0, picture.shape[1] % 2), (0, 0)), mode="edge")
         if self._running is None:
-            self._said = tempfile.TemporaryFile()  # noqa: SIM115 - not a pipe: nobody reads while frames are sent
+            self._output = tempfile.TemporaryFile()  # noqa: SIM115 - not a pipe, which would fill up unread
             command = self._command(even.shape[1], even.shape[0])
-            self._running = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._said, stderr=self._said)
+            self._running = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._output, stderr=self._output)
         assert self._running.stdin is not None
         try:
             self._running.stdin.write(np.ascontiguousarray(even).data)
@@ -164,11 +165,11 @@ class _Ffmpeg:
             if complete and (code or not self._path.stat().st_size):
                 raise OSError(self._reason() or f"ffmpeg ends with code {code}")
         finally:
-            if self._said is not None:
-                self._said.close()
+            if self._output is not None:
+                self._output.close()
 
     def _command(self, width: int, height: int) -> list[str]:
-        # visually lossless, playable while it loads, and with the colours named, or players guess them by size
+        # visually lossless, playable while loading, with explicit colour space, which players else guess by size
         return [
             self._program,
             *("-y", "-v", "error", "-f", "rawvideo", "-vcodec", "rawvideo", "-pix_fmt", "rgb24"),
@@ -181,11 +182,11 @@ class _Ffmpeg:
         ]
 
     def _reason(self) -> str:
-        """What ffmpeg said last."""
-        if self._said is None:
+        """Last line of ffmpeg's output."""
+        if self._output is None:
             return ""
-        self._said.seek(0)
-        lines = self._said.read().decode("utf-8", "replace").strip().splitlines()
+        self._output.seek(0)
+        lines = self._output.read().decode("utf-8", "replace").strip().splitlines()
         return lines[-1] if lines else "ffmpeg ended before the film did"
 
 
@@ -218,7 +219,7 @@ class _Pillow:
         self._pictures.clear()
 
     def _duration(self, frame: int) -> int:
-        """Milliseconds of a frame, rounded so that the film's length is right: GIF counts hundredths."""
+        """Duration of a frame [ms], rounded (GIF has hundredths of a second) so that the film's length is right."""
         unit = 10 if self._kind == "GIF" else 1
         ends = [round(1000 / unit * k / self._rate) for k in (frame, frame + 1)]
         return max(unit * (ends[1] - ends[0]), unit)

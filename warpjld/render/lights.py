@@ -1,4 +1,4 @@
-"""Soft studio light that moves with the camera, or lamps that stand on the stage."""
+"""Lights: a soft studio setup fixed to the camera, or lamps that stand on the stage."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Any
 
 __all__ = ["Lamp", "add_lights", "place_lamps"]
 
-# position seen from the camera (it sits at z = 1 and looks at the origin), colour, intensity
+# position in the camera's frame (it is at z = 1 and looks at the origin), colour, intensity
 _LIGHTS = (
-    # the key from the upper left is broad: three lamps give it a soft border
+    # key light from the upper left: three lamps, for soft shadows
     ((-0.2, 0.8, 1.0), "#fff4e8", 0.32),
     ((-0.9, 0.5, 0.9), "#fff4e8", 0.32),
     ((-0.8, 1.2, 0.2), "#fff4e8", 0.27),
-    # fill, cooler
+    # fill light, cooler
     ((0.5, 0.0, 1.0), "#eef1ff", 0.23),
     ((1.0, 0.2, 0.4), "#e6ecff", 0.25),
-    # rim, from behind
+    # rim light, from behind
     ((0.4, 0.9, -1.0), "#ffffff", 0.32),
-    # what the floor throws back
+    # light reflected by the floor
     ((-0.5, -1.0, 0.5), "#ffdcc8", 0.20),
 )
 

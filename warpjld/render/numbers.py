@@ -1,4 +1,4 @@
-"""Numbers of vertices and facets on a picture, as the file counts them: what the animator's tools are given (R133)."""
+"""Labels of vertices and facets on a picture by the file's own numbers, to which the animator's tools refer (R133)."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 __all__ = ["Numbered", "with_numbers"]
 
 _VERTEX, _FACET, _EDGE, _PAPER = "#1d1d1d", "#1b4f9c", (70, 60, 55, 110), (255, 255, 255, 165)
-_SMALLEST = 9  # pixels a digit is high
-_LINES = 60  # of text on the height of a picture
+_SMALLEST = 9  # smallest height of text [pixels]
+_LINES = 60  # height of a picture in lines of text
 
 
 @dataclass(frozen=True, eq=False)
 class Numbered:
-    """A surface whose numbers are shown.
+    """A surface whose vertices and facets are labelled.
 
     Attributes:
-        points: Vertices as they are drawn [m], shape (n, 3).
+        points: Vertices as drawn [m], shape (n, 3).
         faces: Triangles, shape (t, 3).
         numbers: Number of every vertex, shape (n,).
         facets: Facet of every triangle, shape (t,).
@@ -39,7 +39,7 @@ class Numbered:
     facets: NDArray[np.integer]
 
     def middles(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Middle of every facet [m], shape (f, 3), and its number, shape (f,)."""
+        """Centroid of every facet [m], shape (f, 3), and its number, shape (f,)."""
         numbers, row = np.unique(self.facets, return_inverse=True)
         corners = self.points[self.faces]
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) + 1e-30
@@ -48,7 +48,7 @@ class Numbered:
         return np.stack(sums, axis=1), numbers.astype(np.int64)
 
     def edges(self) -> NDArray[np.integer]:
-        """Edges of the facets, without those that cut polygons into triangles, shape (e, 2)."""
+        """Edges of the facets, without the diagonals of triangulated polygons, shape (e, 2)."""
         half = np.sort(np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]), axis=1)
         once, kind = np.unique(half, axis=0, return_inverse=True)
         facet = np.tile(self.facets, 3)
@@ -60,9 +60,14 @@ class Numbered:
 
 
 def with_numbers(picture: Image, scene: SceneRenderer, surfaces: list[Numbered]) -> Image:
-    """The picture that a scene drew last, with edges and numbers of what is seen of surfaces in it.
+    """The picture that a scene drew last, with the visible edges and numbers of surfaces.
 
-    Where numbers would lie on one another some are left out; a line at the foot says how many.
+    Numbers that would overlap others are left out; a line at the bottom says how many are shown.
+
+    Args:
+        picture: The picture, uint8 (height, width, 3).
+        scene: The renderer that drew it.
+        surfaces: Surfaces in it to label.
     """
     from PIL import Image as Pictures
     from PIL import ImageDraw
@@ -81,18 +86,18 @@ def with_numbers(picture: Image, scene: SceneRenderer, surfaces: list[Numbered])
         middles, numbers = surface.middles()
         places, seen = scene.seen(middles)
         facets.append((places[seen], numbers[seen]))
-    told = []
-    for name, kinds, color in (("vertices", vertices, _VERTEX), ("facets", facets, _FACET)):
+    counts = []
+    for name, labels, color in (("vertices", vertices, _VERTEX), ("facets", facets, _FACET)):
         drawn = sum(
-            board.write(place, str(number), color) for some in kinds for place, number in zip(*some, strict=True)
+            board.write(place, str(number), color) for of_one in labels for place, number in zip(*of_one, strict=True)
         )
-        told.append(f"{name} {drawn:,} of {sum(len(numbers) for _, numbers in kinds):,} in view")
-    board.legend(f"{told[0]} (black), {told[1]} (blue); ZOOM shows more")
+        counts.append(f"{name} {drawn:,} of {sum(len(numbers) for _, numbers in labels):,} in view")
+    board.legend(f"{counts[0]} (black), {counts[1]} (blue); ZOOM shows more")
     return np.ascontiguousarray(canvas, np.uint8)
 
 
 class _Board:
-    """Where numbers stand already."""
+    """Text on a picture without overlaps: keeps the pixels that labels cover."""
 
     def __init__(self, draw: ImageDraw, size: tuple[int, int], height: int) -> None:
         self._draw, self._size, self._font = draw, size, font(height)
@@ -113,6 +118,6 @@ class _Board:
         return True
 
     def legend(self, text: str) -> None:
-        """A line at the foot."""
+        """Write a line at the bottom."""
         at = (self._height, self._size[1] - self._height)
         self._draw.text(at, text, fill=_VERTEX, font=self._font, anchor="lm")

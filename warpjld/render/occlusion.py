@@ -1,6 +1,6 @@
-"""Ambient occlusion from a picture's depths: creases and contacts get less of the light from all around.
+"""Screen-space ambient occlusion from a picture's depths, which darkens creases and contacts.
 
-Computed here and not by VTK's own pass, whose pictures differ from run to run where a processor draws.
+VTK's own pass is not used, since with software rendering its pictures differ from run to run.
 """
 
 from __future__ import annotations
@@ -10,28 +10,28 @@ from numpy.typing import NDArray
 
 __all__ = ["occlusion", "shade"]
 
-_SAMPLES = 20  # directions in which a pixel looks
-_TILE = 4  # pixels in a square of this side look in turned directions; a blur of that size joins them
-_BIAS = 0.12  # cosine below which a neighbour counts as the same flat surface
-_STRENGTH = 4.2  # chosen by eye
+_SAMPLES = 20  # samples per pixel
+_TILE = 4  # side of the squares within which sample directions are rotated, and radius of the blur
+_BIAS = 0.12  # cosine to the normal below which a sample does not occlude
+_STRENGTH = 4.2  # factor of the occlusion, chosen by eye
 
 
 def shade(picture: NDArray[np.uint8], shadow: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Darken a picture (h, w, 3) by an occlusion (h, w); red least, as light in creases has gone through skin."""
+    """Darken a picture (h, w, 3) by an occlusion (h, w), the red channel least, to imitate light scattered in skin."""
     kept = 1 - shadow[..., None] * np.array([0.62, 0.78, 0.84])
     return np.rint(picture * kept).astype(np.uint8)
 
 
 def occlusion(depth: NDArray[np.floating], focal: float, radius: float) -> NDArray[np.float32]:
-    """Share of the light from all around that does not arrive.
+    """Occluded share of the ambient light at each pixel.
 
-    Each visible point looks at others within ``radius``: those that rise over its tangent plane hide light, the
-    more the nearer they are.
+    Each visible point samples others within ``radius``: those above its tangent plane occlude light, the more the
+    nearer they are.
 
     Args:
-        depth: Distance of each pixel along the line of sight [m], shape (h, w); not finite where nothing is.
+        depth: Distance of each pixel along the camera's axis [m], shape (h, w); not finite in the background.
         focal: Distance of the picture plane [pixels].
-        radius: How far surfaces darken one another [m].
+        radius: Largest distance of occluding points [m].
 
     Returns:
         0…1, shape (h, w).
@@ -45,7 +45,7 @@ def occlusion(depth: NDArray[np.floating], focal: float, radius: float) -> NDArr
     solid = solid[window]
     z = np.where(solid, depth[window], np.nan).astype(np.float32)
     height, width = z.shape
-    # pixel coordinates from the middle of the whole picture; y down, z away from the eye
+    # pixel coordinates relative to the centre of the whole picture; y down, z away from the eye
     ys, xs = np.indices(z.shape, dtype=np.float32)
     xs += columns[0] - depth.shape[1] / 2
     ys += rows[0] - depth.shape[0] / 2
@@ -76,7 +76,8 @@ def occlusion(depth: NDArray[np.floating], focal: float, radius: float) -> NDArr
 
 
 def _normals(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Towards the eye, from the neighbour on each axis that is nearer in depth: the other may lie beyond an edge."""
+    """Unit normals towards the eye, shape (h, w, 3), by differences to the neighbour on each axis that is nearer in
+    depth, since the other may lie beyond a silhouette."""
     sides = []
     for axis in (1, 0):
         step = np.diff(points, axis=axis)
@@ -92,7 +93,7 @@ def _normals(points: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _smooth(values: NDArray[np.float32], depth: NDArray[np.float32], step: float) -> NDArray[np.float32]:
-    """Mean over a square of neighbours at nearly the same depth, rows then columns."""
+    """Separable bilateral blur: mean over neighbours whose depth differs by less than ``step``, shape (h, w)."""
     for axis in (0, 1):
         total, weight = np.zeros_like(values), np.zeros_like(values)
         for shift in range(-_TILE, _TILE + 1):

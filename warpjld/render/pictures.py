@@ -1,4 +1,4 @@
-"""Single pictures from plain arrays."""
+"""Single pictures of a surface from plain arrays, shaded or as a wireframe."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def shaded(
     style: Style | None = None,
     quality: Quality | None = None,
 ) -> Image:
-    """A surface, smoothly shaded, or coloured by a number per vertex.
+    """Draw a surface, smoothly shaded, or coloured by a number per vertex.
 
     Args:
         vertices: Welded positions [m], shape (V, 3).
@@ -63,7 +63,7 @@ def wireframe(
     style: Style | None = None,
     quality: Quality | None = None,
 ) -> Image:
-    """Edges of the surface under a veil of skin, with the skeleton inside (R5, R66–R67, Figs 12–15).
+    """Draw the edges of a surface with translucent skin and the skeleton inside (R5, R66–R67, Figs 12–15).
 
     Args:
         vertices: Welded positions [m], shape (V, 3).

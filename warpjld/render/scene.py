@@ -1,4 +1,4 @@
-"""One picture after another of a moving surface: the window is built once, then only vertices change."""
+"""Renderer of many pictures of a moving surface: the window is built once, then only vertices change."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ __all__ = ["Image", "Look", "SceneRenderer", "Solid"]
 
 #: Picture, uint8 (height, width, 3).
 Image = NDArray[np.uint8]
-#: ``shaded``, or ``wireframe``: edges under a veil of skin, the skeleton inside (R5, Figs 12–15).
+#: ``shaded``, or ``wireframe``: edges with translucent skin and the skeleton inside (R5, Figs 12–15).
 Look = Literal["shaded", "wireframe"]
 
-# how far surfaces darken one another, as a share of the bounding box diagonal
+# radius of ambient occlusion relative to the diagonal of the bounding box
 _REACH = 0.09
-# how far behind what is drawn a point must lie to be hidden, likewise
+# depth behind the drawn surface from which a point counts as hidden, likewise
 _HIDDEN = 2e-3
-# dihedral angles [rad] above which an edge is meant to be seen
+# dihedral angles [rad] above which an edge is shown as sharp
 _SKIN_CREASE, _SOLID_CREASE, _BONE_CREASE = 1.15, 0.7, 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """An object beside the surface, say one that is grasped.
+    """An object in addition to the surface, for example one that is grasped.
 
     Attributes:
-        vertices: Positions [m], shape (n, 3); for a moving object give others to `Scene.draw`.
+        vertices: Positions [m], shape (n, 3); those of a moving object are given to `SceneRenderer.draw`.
         faces: Triangles, shape (t, 3).
         color: Name or ``#rrggbb``, see `as_hex`.
         opacity: 0…1.
@@ -61,7 +61,7 @@ class SceneRenderer:
 
     Args:
         faces: Triangles over the welded vertices, shape (T, 3).
-        camera: Where from, see `Camera.view`.
+        camera: The camera, see `Camera.view`.
         look: Kind of picture.
         size: Width and height [pixels].
         segments: Proximal and distal joint of each bone to draw, shape (B, 2); joints come with each frame.
@@ -132,7 +132,7 @@ class SceneRenderer:
         values: ArrayLike | None = None,
         solids: Sequence[ArrayLike | None] = (),
     ) -> Image:
-        """One frame.
+        """Draw one frame.
 
         Args:
             vertices: Positions [m], shape (V, 3).
@@ -144,11 +144,11 @@ class SceneRenderer:
             Picture, uint8 (height, width, 3).
 
         Raises:
-            InputError: Something missing, of the wrong shape, or not finite.
+            InputError: An array that is missing, of the wrong shape, or not finite.
         """
         points = _finite("vertices", vertices, (None, 3))
         if len(points) <= self._faces.max(initial=-1):
-            raise InputError(f"vertices: faces want {self._faces.max() + 1} of them, got {len(points)}")
+            raise InputError(f"vertices: want at least {self._faces.max() + 1} for these faces, got {len(points)}")
         bones = self._bones_from(joints)
         shares = self._shares_from(values, len(points))
         if self._plotter is None:
@@ -169,7 +169,8 @@ class SceneRenderer:
         return self._shoot()
 
     def seen(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Where points (n, 3) [m] are on the picture drawn last, shape (n, 2) [pixels], and which nothing hides."""
+        """Positions of points (n, 3) [m] on the picture drawn last [pixels], shape (n, 2), and which of them are
+        visible, shape (n,)."""
         cloud = _finite("points", points, (None, 3))
         if self._plotter is None:
             raise InputError("seen: draw a frame first")
@@ -186,12 +187,12 @@ class SceneRenderer:
         drawn = -self._plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False)
         drawn = np.pad(np.where(np.isnan(drawn), np.inf, drawn)[::times, ::times], 1, mode="edge")
         column, row = np.where(within, places.T, 0.0).astype(np.int64)
-        # of the pixels around: at the rim a point's own may show what lies behind it, or in front of a slope
+        # farthest of the 3 × 3 pixels around: at silhouettes and on slopes the point's own pixel may be nearer
         around = np.max([drawn[row + dy, column + dx] for dy in range(3) for dx in range(3)], axis=0)
         return places, within & (depth <= around + _HIDDEN * self._extent)
 
     def close(self) -> None:
-        """Free the window; drawing again opens another."""
+        """Close the window; drawing again opens another."""
         if self._plotter is not None:
             self._plotter.close()
             self._plotter = None
@@ -205,10 +206,11 @@ class SceneRenderer:
         self.close()
 
     def _bones_from(self, joints: ArrayLike | None) -> NDArray[np.float64] | None:
+        """Checked joint positions; None where no segments are drawn."""
         if not len(self._pairs):
             return None
         if joints is None:
-            raise InputError("joints: wanted, as segments are drawn")
+            raise InputError("joints: want positions with each frame, since segments are drawn")
         bones = _finite("joints", joints, (None, 3))
         low, high = self._pairs.min(), self._pairs.max()
         if low < 0 or high >= len(bones):
@@ -216,13 +218,15 @@ class SceneRenderer:
         return bones
 
     def _shares_from(self, values: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
+        """Checked values as positions on the colour scale; None without a scale."""
         if (values is None) != (self._scale is None):
-            raise InputError("values: wanted with each frame where a scale is given, and only there")
+            raise InputError("values: want them with each frame if a scale is given, and only then")
         if values is None or self._scale is None:
             return None
         return self._scale.shares(_finite("values", values, (count,)))
 
     def _build(self, points: NDArray[np.float64], joints: NDArray[np.float64] | None) -> None:
+        """Open the window, and add lights, surface, edges, skeleton and solids to it."""
         from warpjld.render.window import open_window
 
         style, times = self._style, self._quality.supersampling
@@ -235,7 +239,7 @@ class SceneRenderer:
         self._skin = RenderedBody(points, self._faces, _SKIN_CREASE) if len(self._faces) else None
         opacity = style.veil if self._wire else style.opacity
         if opacity > 0 and self._skin is not None:
-            # of translucent skin only the front layer is drawn: then nothing needs sorting by depth
+            # only the front layer of translucent skin is drawn, so that no depth sorting is needed
             culling = "back" if opacity < 1 else False
             color = self._scale.table() if self._scale else style.skin
             look: dict[str, Any] = {"opacity": opacity, "culling": culling}
@@ -274,13 +278,15 @@ class SceneRenderer:
         camera.view_angle = float(np.degrees(wanted.angle)) / wanted.zoom
 
     def _clip(self, points: NDArray[np.floating]) -> None:
-        """Depths to draw. VTK would look at the bounds of the frame before, and frames depend on their order."""
+        """Set the clipping range from the points of this frame. VTK would use the bounds of the frame before, and
+        pictures would depend on their order."""
         eye, target = np.asarray(self._camera.position), np.asarray(self._camera.target)
         depths = (points - eye) @ (target - eye) / np.linalg.norm(target - eye)
         far = max(1.1 * float(depths.max()), 1e-6)
         self._plotter.camera.clipping_range = (max(0.9 * float(depths.min()), 1e-3 * far), far)
 
     def _shoot(self) -> Image:
+        """Render the window: supersampled, with ambient occlusion and colour bar."""
         from PIL import Image as Pictures
 
         self._plotter.render()
@@ -297,6 +303,7 @@ class SceneRenderer:
 
 
 def _finite(name: str, array: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """An array as float64; InputError where its shape (None matches any length) is wrong or it is not finite."""
     result = np.asarray(array, np.float64)
     if result.ndim != len(shape) or any(w not in (None, g) for w, g in zip(shape, result.shape, strict=True)):
         want = ", ".join("n" if size is None else str(size) for size in shape)

@@ -1,4 +1,4 @@
-"""Pictures side by side with captions, and contact sheets of key frames."""
+"""Grids of pictures with captions, and contact sheets of key frames."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def grid(
 
     Args:
         rows: Pictures, each uint8 (height, width, 3); the last row may be shorter.
-        captions: Under the columns.
-        row_captions: Left of the rows.
-        title: Above everything.
+        captions: Captions under the columns.
+        row_captions: Captions left of the rows.
+        title: Title above the pictures.
         style: Colours.
 
     Returns:
@@ -49,7 +49,7 @@ def grid(
         raise InputError("grid: want at least one picture")
     shape = pictures[0].shape
     if any(picture.shape != shape for picture in pictures):
-        raise InputError(f"grid: pictures of one size wanted, got {sorted({p.shape[:2] for p in pictures})}")
+        raise InputError(f"grid: want pictures of one size, got {sorted({p.shape[:2] for p in pictures})}")
     height, width = shape[:2]
     columns = max(len(row) for row in rows)
     size = round(9 + min(height, width) / 60)
@@ -91,21 +91,21 @@ def contact_sheet(
     style: Style | None = None,
     quality: Quality | None = None,
 ) -> Image:
-    """Key frames, wire-frame above shaded, with their frame numbers (Figs 12–15).
+    """Grid of key frames, wireframe above shaded, with their frame numbers (Figs 12–15).
 
     Args:
         vertices: Welded positions of the chosen frames [m], shape (F, V, 3).
         faces: Triangles, shape (T, 3).
-        camera: Framed for all of them, see `Camera.view`; give it the cell's ``size``.
+        camera: Camera framed for all of them, see `Camera.view`; give it the ``size`` of one picture.
         joints: Joint positions of the same frames [m], shape (F, J, 3).
         segments: Proximal and distal joint of each segment, shape (B, 2).
         solids: Objects beside the surface.
         moved: Vertices of every object in every frame [m], where they move.
         numbers: Frame numbers for the captions; 0, 1, … if left out.
         looks: Kinds of picture, one above the other.
-        columns: Frames side by side; more frames go on below.
+        columns: Frames side by side; further frames continue below.
         size: Width and height of one picture [pixels].
-        title: Above everything.
+        title: Title above the pictures.
         style: Colours.
         quality: Effort.
 
@@ -113,21 +113,21 @@ def contact_sheet(
         Picture, uint8 (height, width, 3).
 
     Raises:
-        InputError: Arrays whose numbers of frames differ, or no column.
+        InputError: Arrays whose numbers of frames differ, or fewer than one column.
     """
     frames = np.asarray(vertices, np.float64)
     if frames.ndim != 3 or len(frames) == 0:
         raise InputError(f"vertices: want shape (frames, n, 3), got {frames.shape}")
     bones = None if joints is None else np.asarray(joints, np.float64)
     if bones is not None and len(bones) != len(frames):
-        raise InputError(f"joints: want {len(frames)} frames as of vertices, got {len(bones)}")
+        raise InputError(f"joints: want {len(frames)} frames, as many as of vertices, got {len(bones)}")
     names = [str(number) for number in (range(len(frames)) if numbers is None else numbers)]
     if len(names) != len(frames):
         raise InputError(f"numbers: want {len(frames)}, one a frame, got {len(names)}")
     if columns < 1:
         raise InputError(f"columns: want 1 or more, got {columns}")
     if moved is not None and len(moved) != len(frames):
-        raise InputError(f"moved: want {len(frames)} frames as of vertices, got {len(moved)}")
+        raise InputError(f"moved: want {len(frames)} frames, as many as of vertices, got {len(moved)}")
     style, quality = style or Style(), quality or Quality()
     strips: list[list[Image]] = []
     for look in looks:
@@ -154,6 +154,7 @@ def contact_sheet(
 
 
 def _numbered(picture: Image, text: str, style: Style) -> Image:
+    """The picture with a frame number in its lower left corner."""
     from PIL import Image as Pictures
 
     size = max(10, round(picture.shape[0] / 24))
@@ -163,7 +164,7 @@ def _numbered(picture: Image, text: str, style: Style) -> Image:
 
 
 def _fit(canvas: object, place: tuple[float, float], text: str, size: int, color: str, width: int) -> None:
-    """Write centred, smaller where the text is wider than its place."""
+    """Write centred text, in a smaller size where it is wider than ``width`` [pixels]."""
     length = font(size).getlength(text)
     if length > 0.96 * width:
         size = max(8, int(size * 0.96 * width / length))

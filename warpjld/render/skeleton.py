@@ -1,4 +1,4 @@
-"""Segments and joints as meshes of constant topology, so that a film only moves their vertices."""
+"""Meshes of segments and joints with constant topology, so that in a film only their vertices change."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 __all__ = ["bone_faces", "bone_vertices", "joint_faces", "joint_vertices"]
 
-_SIDES = 8  # of a bone's prism
-_COLLAR = 0.16  # share of its length after which a bone is thickest
+_SIDES = 8  # sides of a bone's double cone
+_COLLAR = 0.16  # position of its largest radius, as a share of its length
 
 
 def bone_vertices(joints: NDArray[np.floating], segments: NDArray[np.integer], thickness: float) -> NDArray[np.float32]:
-    """Slender double cones from joint to joint: pointed towards the distal end, as animators draw bones.
+    """Vertices of slender double cones from joint to joint, the usual display of bones in animation software.
 
     Args:
         joints: Joint positions [m], shape (J, 3).
@@ -28,7 +28,7 @@ def bone_vertices(joints: NDArray[np.floating], segments: NDArray[np.integer], t
     axis = end - start
     length = np.linalg.norm(axis, axis=1, keepdims=True)
     axis /= np.maximum(length, 1e-12)
-    # the axis the bone is least along gives a stable square direction
+    # the coordinate axis most perpendicular to the bone gives a stable perpendicular direction
     least = np.eye(3)[np.abs(axis).argmin(axis=1)]
     across = np.cross(axis, least)
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
@@ -46,12 +46,12 @@ def bone_faces(bones: int) -> NDArray[np.int32]:
     following = (around + 1) % _SIDES
     lower = np.stack([np.zeros(_SIDES, int), 1 + following, 1 + around], axis=1)
     upper = np.stack([np.full(_SIDES, _SIDES + 1), 1 + around, 1 + following], axis=1)
-    one = np.concatenate([lower, upper])
-    return (one + (_SIDES + 2) * np.arange(bones)[:, None, None]).reshape(-1, 3).astype(np.int32)
+    single = np.concatenate([lower, upper])
+    return (single + (_SIDES + 2) * np.arange(bones)[:, None, None]).reshape(-1, 3).astype(np.int32)
 
 
 def joint_vertices(joints: NDArray[np.floating], radius: float) -> NDArray[np.float32]:
-    """Little spheres, shape (J · n, 3), for `joint_faces`."""
+    """Vertices of spheres around joints [m], shape (J · n, 3), for `joint_faces`."""
     ball, _ = _ball()
     return (joints[:, None].astype(float) + radius * ball).reshape(-1, 3).astype(np.float32)
 
@@ -64,6 +64,7 @@ def joint_faces(joints: int) -> NDArray[np.int32]:
 
 @lru_cache(maxsize=1)
 def _ball() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and faces of a unit sphere."""
     import trimesh
 
     sphere = trimesh.creation.icosphere(subdivisions=2)

@@ -1,4 +1,4 @@
-"""How things look: colours, materials and how much work a picture is worth."""
+"""Settings of pictures: colours, and rendering effort."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ __all__ = ["Quality", "Style"]
 
 @dataclass(frozen=True)
 class Quality:
-    """Effort a picture.
+    """Rendering effort per picture.
 
     Attributes:
-        supersampling: The picture is drawn this many times larger in both directions, then averaged.
+        supersampling: Factor by which the picture is drawn larger in both directions, then averaged.
         occlusion: Darken creases and contacts (ambient occlusion).
     """
 
@@ -27,12 +27,12 @@ class Quality:
 
     @classmethod
     def film(cls) -> Quality:
-        """Several times faster, for many frames: edges as smooth, without occlusion."""
+        """Several times faster, for many frames: antialiased, without occlusion."""
         return cls(occlusion=False)
 
     @classmethod
     def draft(cls) -> Quality:
-        """Fastest; edges show their pixels."""
+        """Fastest: neither antialiasing nor occlusion."""
         return cls(supersampling=1, occlusion=False)
 
 
@@ -42,15 +42,15 @@ class Style:
 
     Attributes:
         skin: The surface's colour where it is not coloured by values.
-        opacity: Of the skin in shaded pictures.
-        background: Bottom and top of the background.
+        opacity: Opacity of the skin in shaded pictures.
+        background: Colours at the bottom and the top of the background.
         line: Wire-frame edges that face the camera.
         hidden_line: Wire-frame edges that face away.
         veil: Opacity of the skin in wire-frame pictures.
         bone: Segments of the skeleton.
         joint: Its joints.
         ink: Captions.
-        colormap: Matplotlib's name of the colours for values.
+        colormap: Name of a Matplotlib colour map for values.
     """
 
     skin: str = "#f0bda4"

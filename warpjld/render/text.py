@@ -1,4 +1,4 @@
-"""Text on pictures, in the typeface that comes with pillow."""
+"""Text on pictures, in Pillow's built-in typeface."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ def font(size: int) -> Any:
 
 
 def write(canvas: Any, place: tuple[float, float], text: str, *, size: int, color: str, anchor: str = "mm") -> None:
-    """Write one line; ``anchor`` as pillow's: ``mm`` centres it, ``lm`` starts there."""
+    """Write one line of text at a position [pixels]; ``anchor`` as in Pillow: ``mm`` centres it there, ``lm`` starts
+    there."""
     from PIL import ImageDraw
 
     ImageDraw.Draw(canvas).text(place, text, fill=color, font=font(size), anchor=anchor)

@@ -1,4 +1,4 @@
-"""An off-screen window, with or without a display, that leaves the user's own pyvista settings alone."""
+"""Off-screen window, with or without a display, independent of the user's own pyvista settings."""
 
 from __future__ import annotations
 
@@ -21,13 +21,12 @@ _LIBRARIES = {"libEGL.so.1": "vtkEGLRenderWindow", "libOSMesa.so.8": "vtkOSOpenG
 
 
 def open_window(size: tuple[int, int]) -> pyvista.Plotter:
-    """A plotter of ``size`` pixels, without lights and smoothing.
+    """A plotter of ``size`` pixels, without lights and multisampling.
 
-    Pictures are drawn larger and averaged instead, which looks the same everywhere and is the faster way where a
-    processor does the drawing.
+    Pictures are supersampled instead, which gives the same result everywhere and is faster with software rendering.
 
     Raises:
-        WarpjldError: No display, and none of the libraries that do without.
+        WarpjldError: There is neither a display nor a library for rendering without one.
     """
     import pyvista
 
@@ -41,7 +40,7 @@ def open_window(size: tuple[int, int]) -> pyvista.Plotter:
 
 @contextlib.contextmanager
 def _without_display() -> Iterator[None]:
-    """Where there is no display VTK tries X first and warns; name the window that needs none."""
+    """Select a render window that needs no display where there is none: by default VTK tries X first, and warns."""
     if sys.platform != "linux" or os.environ.get("DISPLAY") or _CHOICE in os.environ:
         yield
         return
@@ -53,6 +52,7 @@ def _without_display() -> Iterator[None]:
 
 
 def _window_kind() -> str:
+    """VTK's class of render window for the first library that is installed."""
     for library, kind in _LIBRARIES.items():
         with contextlib.suppress(OSError):
             ctypes.CDLL(library)

@@ -1,4 +1,4 @@
-"""The edges of a surface inside a window: those facing the camera stronger than those behind."""
+"""Edges of a surface inside a window, those that face the camera drawn stronger than those that face away."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from warpjld.render.edges import Edges
 __all__ = ["Wires"]
 
 
-_DISTINCT = 14.0  # pixels between lines from which on they are drawn in full
+_DISTINCT = 14.0  # distance between lines [pixels] from which on they are opaque
 
 
 class Wires:
-    """Two sets of lines over the same vertices; every frame decides anew which edge faces the camera."""
+    """Two sets of lines over the same vertices, front- and back-facing edges, which are sorted anew in every frame."""
 
     def __init__(self, vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> None:
         import pyvista
@@ -30,11 +30,11 @@ class Wires:
         """Add the lines.
 
         Args:
-            plotter: Where.
+            plotter: A pyvista plotter.
             front: Colour of edges that face the camera.
             hidden: Colour of the others.
-            width: Of the front lines [pixels].
-            unit: Pixels a metre at the surface; close lines fade, or they would hide what is inside.
+            width: Width of the front lines [pixels].
+            unit: Pixels per metre at the surface: dense lines are drawn fainter, so that the inside stays visible.
         """
         ends = np.asarray(self._front.points)[self._edges.ends]
         spacing = float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))) * unit
@@ -46,7 +46,7 @@ class Wires:
             plotter.add_mesh(lines, color=color, line_width=thickness, opacity=opacity, lighting=False)
 
     def place(self, vertices: NDArray[np.floating], eye: tuple[float, float, float]) -> None:
-        """Move the vertices, shape (n, 3)."""
+        """Move the vertices to positions [m], shape (n, 3), and sort edges by whether they face the eye."""
         facing = self._edges.facing(vertices, eye)
         for lines, chosen in ((self._front, facing), (self._hidden, ~facing)):
             lines.points = vertices.astype(np.float32)
@@ -54,4 +54,5 @@ class Wires:
 
 
 def _cells(ends: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Edges (E, 2) as VTK line cells."""
     return np.insert(ends, 0, 2, axis=1).ravel().astype(np.int64)

@@ -1,4 +1,4 @@
-"""A surface and its skeleton, as everything here takes them."""
+"""The rig: a surface, its skeleton and painted weights, the common input of all other packages."""
 
 from warpjld.rig.rig import Rig, Skin
 

@@ -1,7 +1,7 @@
-"""Joints off the middle of their flesh: how far they lie from it, and rigs whose joints are moved there.
+"""Position of joints relative to the centre of the flesh around them, and rigs with joints moved to that centre.
 
-A finger or limb that bends about a joint near its skin stretches on one side and crumples on the other. Anatomy puts
-no joint exactly in the middle, so only what is clearly off is told, and nothing is moved unasked.
+A finger or limb that bends about a joint near its skin stretches on one side and crumples on the other. In anatomy no
+joint is exactly in the middle, so only clear deviations are reported, and joints are moved on request only.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["OFF_CENTRE", "OffCentre", "joint_centres", "with_centred_joints"]
 
 OFF_CENTRE = 0.2
-"""Share of the flesh's thickness from which a joint counts as off its middle: a body's elbows and knees lie up to a
-sixth of it off."""
-_RAYS = 72  # every 5 degrees round the bone
-_ALL_ROUND = 0.97  # share of directions in which there must be a surface: at an open end nothing is known
-_STUBBY = 0.6  # radius per shorter segment from which a section is more than a finger's or limb's own flesh
+"""Deviation from the centre, relative to the flesh's thickness, above which a joint counts as off centre: a body's
+elbows and knees deviate by up to a sixth."""
+_RAYS = 72  # directions around the bone: one every 5 degrees
+_ALL_ROUND = 0.97  # share of directions in which a surface must be hit, which excludes open ends
+_STUBBY = 0.6  # radius relative to the shorter segment above which a section includes more than a finger or limb
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +33,10 @@ class OffCentre:
     """A joint and the flesh around it, in the plane halfway between its two segments.
 
     Attributes:
-        joint: Its number.
+        joint: Its index.
         name: Its canonical name.
-        middle: Centroid of the section of flesh [m], shape (3,).
-        distance: From the joint to it [m].
+        middle: Centroid of the cross-section of the flesh [m], shape (3,).
+        distance: Distance of the joint from it [m].
         thickness: Diameter of the circle of the section's area [m].
     """
 
@@ -48,12 +48,12 @@ class OffCentre:
 
     @property
     def off(self) -> bool:
-        """Whether the joint is clearly off the middle."""
+        """Whether the joint is clearly off centre."""
         return self.distance > OFF_CENTRE * self.thickness
 
     @property
     def message(self) -> str:
-        """One line for people."""
+        """One line for the user."""
         return (
             f"{self.name} lies {1e3 * self.distance:.1f} mm off the middle of its flesh, "
             f"which is {1e3 * self.thickness:.1f} mm thick there"
@@ -61,11 +61,11 @@ class OffCentre:
 
 
 def joint_centres(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[OffCentre, ...]:
-    """Where the joints of fingers and limbs lie in their flesh.
+    """Position of the joints of fingers and limbs in the cross-section of their flesh.
 
-    Joints between two segments of which neither branches are looked at: not the trunk's, and not a finger's base, whose
-    section runs through the palm. What lies outside its flesh, or where the flesh is open or as wide as a segment is
-    long, is left out.
+    Only joints between two segments neither of which branches: not the trunk's, and not a finger's base, whose section
+    runs through the palm. Joints outside the flesh, or where it is open or nearly as wide as a segment is long, are
+    left out.
 
     Args:
         skeleton: Rest skeleton.
@@ -86,7 +86,7 @@ def joint_centres(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
         if min(lengths) < 1e-9:
             continue
         halfway = unit(before) + unit(after)
-        if np.linalg.norm(halfway) < 0.2:  # folded back on itself: no plane lies between
+        if np.linalg.norm(halfway) < 0.2:  # segments folded back on each other have no bisecting plane
             continue
         around = nearby(vertices, faces, place, 3.0 * max(lengths))
         section = cross_section(vertices, around, place, unit(halfway), rays=_RAYS)
@@ -98,10 +98,11 @@ def joint_centres(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
 
 
 def with_centred_joints(rig: Rig) -> Rig:
-    """The same rig with each joint that is clearly off moved to the middle of its flesh.
+    """The rig with each joint that is clearly off centre moved to the centre of its flesh.
 
-    The file's own joints stay: a bone's motion is a rigid motion of its flesh wherever one says that it turns about. So
-    own animations carry a moved joint with the bone that begins at it, and motions of angles turn the bone about it.
+    Joints of the source tree stay, since the rigid motion of a bone does not depend on which point it is expressed
+    about. So the file's own animations move a moved joint with the bone that begins at it, and motions given by angles
+    turn the bone about the moved joint.
     """
     rest = rig.skeleton.rest.copy()
     moved = [found for found in joint_centres(rig.skeleton, rig.surface.vertices, rig.surface.faces) if found.off]

@@ -1,4 +1,4 @@
-"""A rig: a surface, the skeleton inside it, and what was found out on the way in."""
+"""A rig: a surface, the skeleton inside it, and the results of reading and recognition."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Skin:
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What a rig file, a surface with a skeleton file, or the built-in hand gives.
+    """A surface with its skeleton, from a rig file, a surface and a skeleton file, or generated.
 
     Attributes:
         name: Short name, e.g. the file's stem.
@@ -38,16 +38,17 @@ class Rig:
         surface: Rest surface in the skeleton's frame.
         skin: Painted weights, where the source has them.
         path: Source file, or None for a generated rig.
-        source: The file's own joints, in its names, order, units and axes: what its animations move. None for a
+        source: The file's own joints, in its names, order, units and axes, which its animations move. None for a
             generated rig.
         sources: Joint of ``source`` that each joint of the skeleton is, -1 where it was added, as fingertips are.
         owner: Joint of the skeleton that each joint of ``source`` moves with, shape (N,); -1 for those above all
-            recognised ones that carry no flesh: they stay where they are.
-        placing: Similarity from the file's units and axes to the skeleton's, shape (4, 4).
+            recognised ones that carry no flesh, which do not move.
+        placing: Similarity transform from the file's units and axes to the skeleton's, shape (4, 4).
         rigid: Joint of the skeleton that a welded vertex follows rigidly, -1 for flesh, shape (V,); None where all
-            is flesh.
-        notes: What was recognised, guessed or mended, for people to read.
-        suspicious: What is probably wrong, and what to do about it: told on stderr by every command.
+            vertices are flesh.
+        notes: Messages for the user about what was recognised, guessed or repaired.
+        suspicious: Warnings for the user about probable errors and their remedies; every command prints them on
+            stderr.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -69,11 +70,11 @@ class Rig:
     suspicious: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        told = (
+        counts = (
             f"{len(self.skeleton)} joints, {len(self.surface.vertices)} vertices, {len(self.surface.faces)} triangles"
         )
         doubts = f", {len(self.suspicious)} suspicious" if self.suspicious else ""
-        return f"Rig('{self.name}': {told}{doubts})"
+        return f"Rig('{self.name}': {counts}{doubts})"
 
     @property
     def source_joints(self) -> tuple[str, ...]:

@@ -88,7 +88,7 @@ class Making:
                 title = "" if self.script is None else self.script.stem
                 _make_pictures(scene, crowd, outputs, out, self.progress, title, failures)
             for role in crowd.roles:
-                scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.told() if role.contact else ()))
+                scene.warned(f"{role.actor.name}: {line}" for line in (role.contact.messages() if role.contact else ()))
             if failures.found and not out.made():
                 if len(failures.found) == 1:
                     (name,) = failures.found

@@ -1,4 +1,4 @@
-"""Tables of results: their columns with units, and the files they are written to."""
+"""Tables of results: columns with units and descriptions, and their files."""
 
 from warpjld.tables.columns import Column, checked_values
 

@@ -1,4 +1,4 @@
-"""The documented schema of a table of results."""
+"""Schema of a table of results: columns with type, unit and description, and validation of values."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class Column:
     """One column of a table.
 
     Attributes:
-        name: As in the file, lower case with underscores.
+        name: Name in the file, lower case with underscores.
         kind: "integer" (int64), "number" (float64), "truth" (bool) or "text" (string). Any value may be missing.
-        unit: SI unit, "" for pure numbers and words.
-        about: What it is, with its frame where it has one.
+        unit: SI unit, "" for dimensionless numbers and text.
+        about: Description, with the frame of reference where there is one.
     """
 
     name: str
@@ -37,7 +37,7 @@ def checked_values(values: Mapping[str, Any], columns: Sequence[Column]) -> dict
     """Values in the columns' order and Python types, missing ones and NaN as None.
 
     Raises:
-        WarpjldError: A value without a column, or of another type: the experiment contradicts its own schema.
+        WarpjldError: A value without a column, or of another type than its column: an error in the program.
     """
     stray = set(values) - {column.name for column in columns}
     if stray:
@@ -46,6 +46,7 @@ def checked_values(values: Mapping[str, Any], columns: Sequence[Column]) -> dict
 
 
 def _checked(value: Any, column: Column) -> Any:
+    """A value as the Python type of its column; None where it is missing or NaN."""
     if value is None:
         return None
     plain: Any = value.item() if hasattr(value, "item") else value

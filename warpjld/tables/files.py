@@ -1,4 +1,4 @@
-"""Tables as Parquet or CSV files, their columns described: results only, so that the same rows give the same bytes."""
+"""Tables in Parquet or CSV files with described columns, without time stamps: equal rows give equal bytes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PURPOSE = "a Parquet table"
 
 
 def require_parquet() -> None:
-    """Raise MissingExtraError where Parquet cannot be written; before a study, not after it."""
+    """Raise MissingExtraError where pyarrow is not installed; called before a study begins."""
     try:
         import pyarrow  # noqa: F401
     except ImportError as error:
@@ -45,7 +45,14 @@ def write_parquet(path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[
 def write_table_csv(
     path: Path, rows: Sequence[dict[str, Any]], columns: Sequence[Column], *, described: str = "columns.json"
 ) -> None:
-    """Write a CSV file (UTF-8, one header line, missing values empty), and a JSON file beside it that describes it."""
+    """Write a CSV file (UTF-8, one header line, missing values empty), and a JSON file of its columns beside it.
+
+    Args:
+        path: The CSV file.
+        rows: Values by column.
+        columns: The columns, in order.
+        described: Name of the JSON file.
+    """
     with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([c.name for c in columns])
@@ -57,7 +64,7 @@ def write_table_csv(
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:
-    """Rows of a table written here, Parquet only.
+    """Read the rows of a table that :func:`write_parquet` wrote.
 
     Raises:
         MissingExtraError: pyarrow is not installed.
@@ -70,6 +77,7 @@ def read_table(path: Path) -> list[dict[str, Any]]:
 
 
 def _cell(value: Any) -> str:
+    """Text of a value in a CSV file."""
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""Contact of the skin without finite elements: a display of it, after the covering's operators."""
+"""Geometric contact of the skin for display, without finite elements: overlaps are removed after deformation."""
 
 from warpjld.touch.limit import LimitedDigit, close_until_touch
 from warpjld.touch.touch import SHARE, Touch, Touched

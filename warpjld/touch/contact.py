@@ -1,4 +1,4 @@
-"""The skin's contact over a sequence, block by block, and what is told of it afterwards."""
+"""Skin contact over a sequence of frames, block by block, and the messages about it for the user."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["SkinContact"]
 
 
 class SkinContact:
-    """What ``deform --touch`` and ``TOUCH`` do to a covering's poses and surfaces.
+    """Skin contact of ``deform --touch`` and ``TOUCH``: limits poses, separates surfaces, and collects messages.
 
     Args:
         covering: The covering.
@@ -41,63 +41,63 @@ class SkinContact:
 
     @cached_property
     def touch(self) -> Touch:
-        """The contact of the covering's own parts."""
+        """Contact between the covering's own parts."""
         from warpjld.touch.touch import Touch
 
         return Touch.of(self._covering)
 
     def poses(self, poses: Poses, *, first: int = 0) -> Poses:
-        """The poses, with digits closed only until they touch where that is wanted."""
+        """The poses, or where ``limits`` is set, poses whose digits close only until they touch."""
         if not self._limits:
             return poses
         from warpjld.touch.limit import close_until_touch
 
         limited, closed = close_until_touch(self._covering, poses, self.touch, first=first)
-        self._closed.update({(one.digit, one.frame): one for one in closed})
+        self._closed.update({(limit.digit, limit.frame): limit for limit in closed})
         return limited
 
     def skin(self, points: NDArray[np.float32], poses: Poses, *, first: int = 0) -> NDArray[np.float32]:
-        """Surfaces (F, V, 3) of poses, the frames from ``first`` on, what crosses parted."""
+        """Surfaces [m] (F, V, 3) of the frames from ``first`` on, with overlapping skin separated."""
         parted, deep = self.touch.apply(points, poses, first=first)
-        for one in deep:
-            worst = self._deepest.get(one.part)
-            self._deep.add((one.part, one.frame))  # a frame may be asked for twice
-            if worst is None or one.depth > worst[0].depth:
-                k = one.frame - first
-                self._deepest[one.part] = one, poses[k : k + 1]
+        for overlap in deep:
+            worst = self._deepest.get(overlap.part)
+            self._deep.add((overlap.part, overlap.frame))  # a set, since a frame may be computed twice
+            if worst is None or overlap.depth > worst[0].depth:
+                k = overlap.frame - first
+                self._deepest[overlap.part] = overlap, poses[k : k + 1]
         return np.asarray(parted, dtype=np.float32)
 
     def hold(
         self, points: NDArray[np.float32], held: Sequence[tuple[GraspObject, Places]], *, first: int = 0
     ) -> NDArray[np.float32]:
-        """Surfaces (F, V, 3) with skin that lies inside rigid objects flattened on them; F places of each."""
+        """Surfaces [m] (F, V, 3) with skin inside rigid objects flattened onto them; F places of each object."""
         from warpjld.grasp.distance import ObjectSet
         from warpjld.touch.held import flatten_on
 
-        for thing, places in held:
-            if id(thing) not in self._objects:
-                self._objects[id(thing)] = ObjectSet(thing)
-            points, deep = flatten_on(self.touch, points, self._objects[id(thing)], [places], first=first)
-            for one in deep:
-                worst = self._in_objects.setdefault((one.part, one.other), one)
-                if one.depth > worst.depth:
-                    self._in_objects[one.part, one.other] = one
+        for held_object, places in held:
+            if id(held_object) not in self._objects:
+                self._objects[id(held_object)] = ObjectSet(held_object)
+            points, deep = flatten_on(self.touch, points, self._objects[id(held_object)], [places], first=first)
+            for overlap in deep:
+                worst = self._in_objects.setdefault((overlap.part, overlap.other), overlap)
+                if overlap.depth > worst.depth:
+                    self._in_objects[overlap.part, overlap.other] = overlap
         return points
 
-    def told(self) -> list[str]:
-        """A line a digit that was closed less, and one a digit or part that lies too deep in another, each at its
-        worst."""
+    def messages(self) -> list[str]:
+        """Messages for the user: a line for each digit that was closed less than posed, and one for each digit or part
+        that lies too deep in another, with its worst frame."""
         lines = self._too_coarse()
         for name in dict.fromkeys(digit for digit, _ in self._closed):
-            mine = [one for (digit, _), one in self._closed.items() if digit == name]
-            stuck = [one.frame for one in mine if one.crosses]
+            limits = [limit for (digit, _), limit in self._closed.items() if digit == name]
+            stuck = [limit.frame for limit in limits if limit.crosses]
             if stuck:
                 lines.append(
                     f"{name}: {_frames(len(stuck))} cross something however far it opens, as at frame {stuck[0]}"
                 )
-            closed = [one for one in mine if one.share < 1.0]
+            closed = [limit for limit in limits if limit.share < 1.0]
             if closed:
-                worst = max(closed, key=lambda one: one.depth)
+                worst = max(closed, key=lambda limit: limit.depth)
                 inside = f"{1e3 * worst.depth:.1f} mm inside {worst.other} as posed" if worst.other else "folded"
                 lines.append(
                     f"{name}: {_frames(len(closed))} closed only until it touches, deepest at frame {worst.frame}: "
@@ -105,23 +105,24 @@ class SkinContact:
                 )
         lines += self._too_deep()
         lines += [
-            f"{one.part}: {1e3 * one.depth:.1f} mm inside {one.other} at frame {one.frame}, more than skin can give"
-            for one in self._in_objects.values()
+            f"{deep.part}: {1e3 * deep.depth:.1f} mm inside {deep.other} at frame {deep.frame}, more than skin can give"
+            for deep in self._in_objects.values()
         ]
         return lines
 
     def _too_coarse(self) -> list[str]:
-        """Parts of digits that cannot be parted: what else is too coarse seldom touches anything."""
+        """Message about parts of digits whose mesh is too coarse for separation; other parts seldom touch anything."""
         digits = digit_joints(self._covering.skeleton)
         pairs = zip(self.touch.patches.names, self.touch.coarse, strict=True)
         names = [name for name, coarse in pairs if coarse and name.rpartition(".")[0] in digits]
         if not names:
             return []
         more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        return [f"touch: {', '.join(names[:3])}{more}: edges too long for such thin flesh; nothing is parted there"]
+        return [f"touch: {', '.join(names[:3])}{more}: edges too long for such thin flesh; skin is not parted there"]
 
     def _too_deep(self) -> list[str]:
-        """By digit, with the flexion at which it touches; parts of the body by themselves."""
+        """Messages about overlaps that are too deep: one for each digit, with the flexion at which it touches, and one
+        for each other part."""
         from warpjld.touch.limit import close_until_touch
 
         digits = digit_joints(self._covering.skeleton)
@@ -135,7 +136,8 @@ class SkinContact:
             frames = len({frame for part, frame in self._deep if part in parts})
             touches = ""
             if name in digits:
-                closed = [one for one in close_until_touch(self._covering, pose, self.touch)[1] if one.digit == name]
+                limits = close_until_touch(self._covering, pose, self.touch)[1]
+                closed = [limit for limit in limits if limit.digit == name]
                 touches = f"; it touches at {closed[0].flexion:.0f}° of flexion in all" if closed else ""
             lines.append(
                 f"{name}: {1e3 * worst.depth:.1f} mm inside {worst.other} at frame {worst.frame} "

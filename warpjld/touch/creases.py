@@ -1,4 +1,4 @@
-"""Planes in which the two sides of a bent joint meet."""
+"""Bisecting planes of joints, at which the two sides of a bent joint are separated."""
 
 from __future__ import annotations
 
@@ -23,39 +23,40 @@ if TYPE_CHECKING:
 __all__ = ["Creases"]
 
 _KEPT = 0.25
-"""Of its rest distance from the plane that every vertex keeps at most. Without any, skin of both sides would lie in one
-plane and cross by rounding; more moves what does not cross."""
+"""Share of its rest distance from the plane that a vertex is kept away from it at most. At 0 the skin of both sides
+would lie in one plane and cross by rounding; larger values move skin that does not cross."""
 
-_LEAST_APART = 0.03  # thicknesses that a vertex keeps from the plane, where that is not more than its share
-_WIDER = 4.0  # times as far apart as both have passed through one another around
-_WIDEST = 1.0  # thicknesses that they are apart then at most
-_STEPS = 3  # of pushing and smoothing: one leaves a fifth more of what crosses, a fourth changes little
-_REACH = 6.0  # thicknesses from the joint, over the last of which it fades
-_BENT = (np.radians(5.0), np.radians(20.0))  # from rest, between which a joint comes to press its sides
-_WIDE = (0.9, 1.4)  # thicknesses along the axis between which it fades: what is beside a knuckle is another's skin
-_LEAST = 0.02  # of a vertex that both segments must hold for it to count
+_LEAST_APART = 0.03  # smallest distance of a vertex from the plane, in thicknesses, where `_KEPT` allows it
+_WIDER = 4.0  # additional separation relative to the smoothed overlap
+_WIDEST = 1.0  # upper bound of the additional separation, in thicknesses
+_STEPS = 3  # pushing and smoothing steps: one leaves a fifth more crossings, a fourth changes little
+_REACH = 6.0  # range from the joint, in thicknesses; weights fade over the last one
+_BENT = (np.radians(5.0), np.radians(20.0))  # rotation from rest over which separation sets in
+_WIDE = (0.9, 1.4)  # range along the flexion axis, in thicknesses, over which weights fade: beyond is other skin
+_LEAST = 0.02  # smallest weight of a vertex that is used
 
 
 @dataclass(frozen=True, eq=False)
 class Creases:
-    """The planes that halve the angles of joints, and the vertices near them.
+    """The bisecting planes of joints, and the vertices near them.
 
-    A joint between a segment along a and one along b has the plane through it normal to a + b at rest, which the
-    rotation halfway between its bones turns. The papers' inner surfaces meet on it (A §4).
+    The plane of a joint between segments along a and b passes through the joint, normal to a + b at rest, and turns by
+    the rotation halfway between its bones. The papers' inner surfaces meet on it (A §4). An entry is a vertex near one
+    plane.
 
     Attributes:
-        joint: Joint of every crease, shape (C,).
-        parent: The joint its first segment begins at, likewise.
-        normal: Normal at rest, towards the second segment, shape (C, 3).
-        vertex: Vertices near any of them, shape (N,).
-        first: First entry of each, and their number, shape (N + 1,).
-        crease: Crease of every entry.
-        height: Rest distance from its plane [m], positive on the side of the second segment.
-        weight: How much it counts, 0…1.
-        opposite: Three vertices of the other side, where the plane mirrors this one to at rest, shape (entries, 3).
-        share: Their shares, likewise.
-        size: Thickness of the flesh at every crease [m], shape (C,).
-        smooth: Rows that smooth a field over the surface, shape (V, V).
+        joint: Joint of every plane, shape (C,).
+        parent: Joint where its first segment begins, likewise.
+        normal: Unit normal at rest, towards the second segment, shape (C, 3).
+        vertex: Vertices near any plane, shape (N,).
+        first: First entry of each of them, and the number of entries, shape (N + 1,).
+        crease: Plane of every entry.
+        height: Signed rest distance from the plane [m], positive on the side of the second segment.
+        weight: Weight of the entry, 0…1.
+        opposite: Three vertices of the other side near the vertex's mirror image at rest, shape (entries, 3).
+        share: Their weights, rows summing to one, likewise.
+        size: Thickness of the flesh at every plane [m], shape (C,).
+        smooth: Smoothing matrix for fields on the surface, shape (V, V).
     """
 
     joint: NDArray[np.int32]
@@ -73,7 +74,7 @@ class Creases:
 
     @classmethod
     def of(cls, covering: Covering, patches: Patches) -> Creases:
-        """Of every joint between segments of different operators."""
+        """Planes of all joints between segments of different operators."""
         skeleton, vertices = covering.skeleton, covering.surface.vertices
         thick = segment_distance(vertices, skeleton.rest, [(s.proximal, s.distal) for s in skeleton.segments])
         shell = patches.shell
@@ -108,6 +109,7 @@ class Creases:
     def _sorted(
         cls, planes: list[tuple[int, int, NDArray[np.float64], float]], entries: list[_Entries], smooth: csr_array
     ) -> Creases:
+        """The planes (joint, parent, normal, size) and their entries, sorted by vertex."""
         joined = _Entries.joined(entries)
         crease = np.repeat(np.arange(len(entries)), [len(e.rows) for e in entries])
         order = np.argsort(joined.rows, kind="stable")
@@ -128,10 +130,10 @@ class Creases:
         )
 
     def part(self, points: Any, poses: Poses) -> None:
-        """Part frames in place.
+        """Separate the two sides of bent joints, in place.
 
         Args:
-            points: Warp array of deformed vertices on the CPU, shape (F, V).
+            points: Warp array of deformed vertices on the CPU, vec3, shape (F, V).
             poses: Their poses.
         """
         import warp as wp
@@ -168,7 +170,7 @@ class Creases:
 
     @cached_property
     def _arrays(self) -> list[Any]:
-        """Of the kernels: the creases, the vertices that a smoothing reaches from them, and its rows."""
+        """Kernel arguments: the creases, the vertices that smoothing reaches from them, and the smoothing matrix."""
         import warp as wp
         from warpjld_kernels.touch_crease import Creases as Arrays
 
@@ -183,8 +185,8 @@ class Creases:
         pushed[self.vertex] = 1.0
         reached = np.flatnonzero(self.smooth @ pushed)
         kinds = (wp.int32, wp.int32, wp.int32, float)
-        some = (reached, self.smooth.indptr, self.smooth.indices, self.smooth.data)
-        return [out, *(array(values, kind) for values, kind in zip(some, kinds, strict=True))]
+        arrays = (reached, self.smooth.indptr, self.smooth.indices, self.smooth.data)
+        return [out, *(array(values, kind) for values, kind in zip(arrays, kinds, strict=True))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,9 +209,16 @@ class _Entries:
         size: float,
         shell: NDArray[np.int32],
     ) -> _Entries | None:
-        """Of vertices at offsets (N, 3) from the joint; None where one side has fewer than three.
+        """Entries of vertices near one plane; None where one side has fewer than three vertices.
 
-        What is opposite is of the same shell (N,): pieces that lie in one another at a joint were made to.
+        Args:
+            rows: Vertices, shape (N,).
+            offset: Their offsets from the joint at rest [m], shape (N, 3).
+            normal: Normal of the plane, shape (3,).
+            weight: Weight of each vertex, shape (N,).
+            size: Thickness of the flesh [m].
+            shell: Connected component of each, shape (N,). Opposite vertices are of the same one, since separate pieces
+                that overlap at a joint are meant to.
         """
         height = offset @ normal
         sides = [np.flatnonzero(height < 0.0), np.flatnonzero(height > 0.0)]
@@ -220,24 +229,30 @@ class _Entries:
         opposite = np.zeros((len(rows), 3), dtype=np.int64)
         share = np.zeros((len(rows), 3))
         gate = np.zeros(len(rows))
-        for mine, others in (sides, sides[::-1]):
-            distance, near = cKDTree(offset[others]).query(mirrored[mine], k=3)
+        for near_side, far_side in (sides, sides[::-1]):
+            distance, near = cKDTree(offset[far_side]).query(mirrored[near_side], k=3)
             inverse = 1.0 / (distance + 1e-3 * size)
-            opposite[mine], share[mine] = rows[others[near]], inverse / inverse.sum(axis=1, keepdims=True)
-            gate[mine] = np.clip(2.0 - 2.0 * distance[:, 0] / size, 0.0, 1.0)
+            opposite[near_side], share[near_side] = rows[far_side[near]], inverse / inverse.sum(axis=1, keepdims=True)
+            gate[near_side] = np.clip(2.0 - 2.0 * distance[:, 0] / size, 0.0, 1.0)
         kept = np.flatnonzero(weight * gate > _LEAST)
         return cls(rows[kept], height[kept], (weight * gate)[kept], opposite[kept], share[kept])
 
     @staticmethod
-    def joined(some: list[_Entries]) -> _Entries:
-        """All of them, one after another."""
+    def joined(entries: list[_Entries]) -> _Entries:
+        """Concatenation of entries."""
         none = _Entries(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 3), np.int64), np.zeros((0, 3)))
         names = [field.name for field in fields(_Entries)]
-        return _Entries(*(np.concatenate([getattr(e, name) for e in (none, *some)]) for name in names))
+        return _Entries(*(np.concatenate([getattr(e, name) for e in (none, *entries)]) for name in names))
 
 
 def _size(thick: NDArray[np.float64], distance: NDArray[np.float64], share: NDArray[np.float64]) -> float:
-    """Thickness of the second segment's flesh in the half of it next to the joint [m]; 0 where it has none."""
+    """Median thickness of the second segment's flesh in the half next to the joint [m]; 0 where it has none.
+
+    Args:
+        thick: Distance of every vertex from its bone [m], shape (V,).
+        distance: Distance of every vertex from the joint [m], shape (V,).
+        share: Weight of the second segment's operator at every vertex, shape (V,).
+    """
     held = share > 0.5
     if not held.any():
         return 0.0

@@ -1,4 +1,4 @@
-"""One frame's surface parted: what lies where, and both sides moved out of one another."""
+"""Separation of overlapping parts of one frame's surface: detection of overlaps, then displacement of both sides."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from warpjld.touch.patches import Patches
 __all__ = ["FULL", "NONE", "SHARE", "Bench", "Model", "Overlaps", "fade"]
 
 SHARE = 1.0 / 3.0
-"""Of the local thickness: overlaps up to it skin can give way to, deeper ones are poses that nobody can take."""
+"""Depth of overlaps relative to the local thickness up to which skin can yield; deeper ones are impossible poses.
+Depths below are in units of this share."""
 
-# shares: what lies that deep at most is parted in full, what lies deeper than the second is left alone: at three, the
-# middle of the flesh, the way out is on the other side. Parted in full up to two, a closing fist gave its skin up in
-# a few frames: 3 mm in one of 240, now 1
+# the separated part of an overlap fades from all at a depth of FULL to nothing at NONE: at three, the middle of the
+# flesh, the outward direction flips. With FULL = 2, overlaps of a closing fist disappeared in a few frames: 3 mm in one
+# of 240, now 1
 FULL, NONE = 1.0, 2.75
-_SWEEPS = 2  # a third parts hardly more and costs as much as the second
-_SOFT = 0.05  # shares over which an overlap comes to count
-_JUST = 0.1  # shares that two parts must lie in one another for what parting makes of it to be parted again
-_CLEARANCE = 0.05  # shares by which both sides are moved beyond their meeting
-_STIFFNESS = 0.1  # of the fit of planes: samples that weigh less than that in all move nothing in full
-_SWELLS = 1.1  # times as far from its bones as at rest flesh may come by bending
-# of a part's median thickness: how far apart vertices are that are asked first how deep they lie, and those that are
-# asked where that is farther than so many shares, over as many again
+_SWEEPS = 2  # separation sweeps; a third separates hardly more and costs as much as the second
+_SOFT = 0.05  # depth over which the weight of an overlap sets in
+_JUST = 0.1  # initial depth of a pair of parts from which on it is separated in full
+_CLEARANCE = 0.05  # distance by which both sides are moved beyond the common surface
+_STIFFNESS = 0.1  # regularisation of the fit of planes: a smaller total weight gives a smaller displacement
+_SWELLS = 1.1  # factor of a mesh's largest distance from its bones at rest, to allow for bending
+# spacing, relative to a part's median thickness, of the probes that are tested first, and of the vertices that suffice
+# where the probes' depth is larger than _FEW; the weight of all others fades over as much again
 _PROBES, _APART, _FEW = 1.0, 0.3, 0.35
-_BULGE = 0.5  # shares that a bulge is high at most
+_BULGE = 0.5  # largest height of a bulge
 
 
 def fade(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much of an overlap is parted whose deepest place is so many shares deep: 1 to ``FULL``, 0 from ``NONE``."""
+    """Separated share of an overlap by its largest depth in units of ``SHARE``: 1 up to ``FULL``, 0 from ``NONE``."""
     return smoothstep((NONE - ratio) / (NONE - FULL))
 
 
@@ -44,11 +45,11 @@ class Overlaps:
     """Vertices of one frame that lie inside another part, N of them.
 
     Attributes:
-        vertex: Their numbers.
-        part: Their parts.
-        other: What they are inside of.
-        depth: How deep [m], beyond what overlaps at rest.
-        ratio: The same in shares of what skin can give way to; above 1 nobody can take the pose.
+        vertex: Their indices, shape (N,).
+        part: Their parts, shape (N,).
+        other: Parts they lie inside, shape (N,).
+        depth: Penetration depth beyond the overlap at rest [m], shape (N,).
+        ratio: The same relative to what skin can yield, shape (N,); above 1 the pose is impossible.
     """
 
     vertex: NDArray[np.int32]
@@ -60,17 +61,17 @@ class Overlaps:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """What parting needs of a surface in any frame.
+    """Pose-independent data of a surface for separation.
 
     Attributes:
         patches: Its parts.
-        smooth: Rows that smooth a field, shape (V, V).
-        at_rest: Depth of every vertex that is no overlap since it is one at rest [m], shape (V,); None while that is
-            being found: then overlaps count whichever way surfaces face.
-        never: Parts that may lie in one another, shape (P, P).
+        smooth: Smoothing matrix, shape (V, V).
+        at_rest: Penetration depth of every vertex at rest, which is subtracted from overlaps [m], shape (V,); None
+            while that is measured: then overlaps count regardless of orientation.
+        never: Pairs of parts that are allowed to overlap, shape (P, P).
         edge: Mean length of the edges at every vertex [m], shape (V,).
         joints: Number of joints of the skeleton, 0 where there is none.
-        around: How far the mesh of every part is from its bones at most [m], shape (P,).
+        around: Largest distance of the mesh of every part from its bones [m], shape (P,).
     """
 
     patches: Patches
@@ -83,9 +84,9 @@ class Model:
 
 
 class Bench:
-    """Meshes of the parts and arrays of one frame: made once for a thread, refitted for every frame it takes.
+    """Workspace of one thread: meshes of the parts, refitted for every frame, arrays, and recorded kernel launches.
 
-    Launches are recorded once: of a frame's time their arguments would take as much as the work.
+    Launches are recorded once, since packing their arguments would take as long as the kernels of a frame.
     """
 
     def __init__(self, model: Model, vertices: NDArray[np.floating]) -> None:
@@ -112,10 +113,11 @@ class Bench:
         self._lost, self._room = (wp.zeros(names, dtype=float, device="cpu") for _ in range(2))
         first, beside = model.patches.spaced(vertices, _PROBES)
         apart, _ = model.patches.spaced(vertices, _APART)
-        asked = [np.flatnonzero(some) for some in (first, apart & ~first, ~apart & ~first)]
-        self._record(star, smooth, asked, beside)
+        tested = [np.flatnonzero(mask) for mask in (first, apart & ~first, ~apart & ~first)]
+        self._record(star, smooth, tested, beside)
 
     def _parts(self, model: Model, vertices: NDArray[np.floating]) -> Any:
+        """The kernels' struct ``touch_parts.Parts``."""
         import warp as wp
         from warpjld_kernels.touch_parts import Parts
 
@@ -127,8 +129,8 @@ class Bench:
         empty = np.array([not len(f) for f, _ in meshes], dtype=bool)
         beside = np.full((names, int(joined.sum(axis=1).max())), -1)
         for k, row in enumerate(joined):
-            some = np.flatnonzero(row)
-            beside[k, : len(some)] = some
+            near = np.flatnonzero(row)
+            beside[k, : len(near)] = near
         parts = Parts()
         parts.part = numbers(patches.part)
         parts.mesh = wp.array([m.id if m else 0 for m in self._meshes], dtype=wp.uint64, device="cpu")
@@ -150,15 +152,17 @@ class Bench:
         parts.facing = 1.0 if model.at_rest is None else 0.0
         parts.edge = floats(model.edge)
         bones = patches.bones if model.joints else ((),) * names
-        parts.first_bone = starts([len(some) for some in bones])
-        flat = np.array([pair for some in bones for pair in some], dtype=np.int32).reshape(-1, 2)
+        parts.first_bone = starts([len(of_part) for of_part in bones])
+        flat = np.array([pair for of_part in bones for pair in of_part], dtype=np.int32).reshape(-1, 2)
         parts.bone = wp.array(flat, dtype=wp.vec2i, device="cpu")
         parts.around = floats(_SWELLS * model.around)
         return parts
 
     def _record(
-        self, star: list[Any], smooth: list[Any], asked: list[NDArray[np.int64]], beside: NDArray[np.int64]
+        self, star: list[Any], smooth: list[Any], tested: list[NDArray[np.int64]], beside: NDArray[np.int64]
     ) -> None:
+        """Record all kernel launches, from the faces around every vertex, the smoothing matrix, the three groups of
+        vertices that are tested in turn, and the nearest probe of every vertex."""
         import warp as wp
         from warpjld_kernels import touch_parts
 
@@ -186,51 +190,54 @@ class Bench:
             [points, parts.part, self._active, *star, parts.area],
             [self._normals, units, plains],
         )
-        self._record_samples([points, units, plains, low, high, pairs, others, self.joints, *boxes], asked, beside)
+        self._record_samples([points, units, plains, low, high, pairs, others, self.joints, *boxes], tested, beside)
         self._record_parting(boxes, smooth)
 
-    def _record_samples(self, frame: list[Any], asked: list[NDArray[np.int64]], beside: NDArray[np.int64]) -> None:
+    def _record_samples(self, frame: list[Any], tested: list[NDArray[np.int64]], beside: NDArray[np.int64]) -> None:
+        """Record the launches that find samples: probes first, then the vertices that these leave to be tested."""
         import warp as wp
         from warpjld_kernels import touch_parting, touch_samples
 
         count, names, parts = len(self.points), len(self._meshes), self.parts
-        probed, apart, every = (wp.ones((names, names), dtype=float, device="cpu") for _ in range(3))
-        self._heard = apart.numpy(), every.numpy()
+        probed, apart, others = (wp.ones((names, names), dtype=float, device="cpu") for _ in range(3))
+        self._pair_weights = apart.numpy(), others.numpy()
         deep = wp.zeros((names, names), dtype=float, device="cpu")
         ratio = wp.zeros(count + 1, dtype=float, device="cpu")
         none, probe = numbers(np.full(count, count)), numbers(beside)
         self._probe, *self._find_samples = (
             recorded(
                 touch_samples.find_samples,
-                len(some),
-                [numbers(some), heard, where, deep, *frame, parts, SHARE, _SOFT, NONE],
+                len(vertices),
+                [numbers(vertices), weight, near, deep, *frame, parts, SHARE, _SOFT, NONE],
                 [ratio, self._deepest, self.samples],
             )
-            for some, heard, where in zip(asked, (probed, apart, every), (none, probe, none), strict=True)
+            for vertices, weight, near in zip(tested, (probed, apart, others), (none, probe, none), strict=True)
         )
         self._choose = recorded(
-            touch_parting.choose_heard, (names, names), [self._deepest, _FEW, NONE], [apart, every, deep]
+            touch_parting.choose_pair_weights, (names, names), [self._deepest, _FEW, NONE], [apart, others, deep]
         )
-        # as deep as the pose is, in every sweep: what is parted in part would be parted ever more
+        # by the depths before separation in every sweep, or a partial separation would increase with each
         self._fade = recorded(
             touch_parting.fade_pairs, (names, names), [parts, self._deepest, FULL, NONE, _JUST], [self._shown]
         )
 
     def _record_parting(self, boxes: list[Any], smooth: list[Any]) -> None:
+        """Record the launches that separate parts and restore their volume."""
         import warp as wp
         from warpjld_kernels import touch_bulge, touch_parting
 
         count, names = len(self.points), len(self._meshes)
         parts, points, normals, samples = self.parts, self.points, self._normals, self.samples
-        heeded = wp.zeros(names, dtype=wp.int32, device="cpu")
-        heed = wp.zeros((names, count), dtype=wp.int32, device="cpu")
-        self._heed_nothing = recorded(touch_parting.heed_nothing, names, [], [heeded, *boxes])
-        self._heed = recorded(touch_parting.heed_samples, 1, [samples, self._shown, parts], [heeded, heed, *boxes])
+        sample_count = wp.zeros(names, dtype=wp.int32, device="cpu")
+        assigned = wp.zeros((names, count), dtype=wp.int32, device="cpu")
+        outputs = [sample_count, assigned, *boxes]
+        self._clear_assigned = recorded(touch_parting.clear_assigned, names, [], [sample_count, *boxes])
+        self._assign = recorded(touch_parting.assign_samples, 1, [samples, self._shown, parts], outputs)
         self._part = [
             recorded(
                 touch_parting.part_surfaces,
                 count,
-                [points, normals, samples, self._shown, heeded, heed, *boxes, parts, _CLEARANCE, _SOFT, _STIFFNESS],
+                [points, normals, samples, self._shown, *outputs, parts, _CLEARANCE, _SOFT, _STIFFNESS],
                 [self._moved],
             ),
             recorded(touch_parting.move, count, [self._moved], [points]),
@@ -240,7 +247,7 @@ class Bench:
             recorded(
                 touch_bulge.measure_displaced,
                 count,
-                [self._start, points, normals, parts.part, heeded, parts.give, *smooth],
+                [self._start, points, normals, parts.part, sample_count, parts.give, *smooth],
                 displaced,
             ),
             recorded(
@@ -252,12 +259,12 @@ class Bench:
         ]
 
     def measure(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> Overlaps:
-        """What overlaps in one frame (V, 3), whose joints are there (J, 3) where that is known."""
+        """Overlaps in a frame of points [m] (V, 3), with joints at [m] (J, 3) where these are known."""
         return self._overlaps(self._first(points, joints, everywhere=True))
 
     def part(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None) -> Overlaps:
-        """Part one frame (V, 3) in place; what overlapped before, of pairs of parts that lie too deep in one another
-        only at some vertices."""
+        """Separate the parts of a frame in place; arguments as of :meth:`measure`. Returns the overlaps before
+        separation, those of pairs of parts too deep to be separated at some vertices only."""
         count = self._first(points, joints, everywhere=False)
         found = self._overlaps(count)
         if not count:
@@ -272,9 +279,9 @@ class Bench:
                 self._fade.launch()
             if not count:
                 break
-            self._heed_nothing.launch()
-            self._heed.set_dim(count)
-            for command in (self._heed, *self._part):
+            self._clear_assigned.launch()
+            self._assign.set_dim(count)
+            for command in (self._assign, *self._part):
                 command.launch()
             if sweep == 0:
                 self._lost.numpy()[...] = 0.0
@@ -286,21 +293,22 @@ class Bench:
         return found
 
     def _first(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None, *, everywhere: bool) -> int:
+        """Load a frame and find its samples, at all vertices or as the probes decide; returns their number."""
         self.points.numpy()[...] = points
         self.joints.numpy()[...] = np.nan if joints is None else joints
         self._shown.numpy()[...] = 1.0
         self._deepest.numpy()[...] = 0.0
         for box, end in zip(self._everywhere, (-np.inf, np.inf), strict=True):
             box[...] = end
-        for heard in self._heard:
-            heard[...] = 1.0
+        for weight in self._pair_weights:
+            weight[...] = 1.0
         return self._find(choose=not everywhere)
 
     def _find(self, *, choose: bool = False) -> int:
-        """Fill ``samples`` from ``points``; how many there are.
+        """Fill ``samples`` from ``points``; returns their number.
 
-        Most of what lies in one another in a pose that nobody can take is too deep to be parted, and a few vertices
-        say so: with ``choose`` the others are not asked about it.
+        In impossible poses most overlaps are too deep to be separated, which the probes show: with ``choose`` other
+        vertices of such pairs are not tested.
         """
         wanted, active = self._wanted.numpy(), self._active.numpy()
         wanted[...] = 0
@@ -308,10 +316,10 @@ class Bench:
         self._count[...] = 0
         for command in self._find_pairs:
             command.launch()
-        asked = np.flatnonzero(wanted).tolist()
-        if not asked:
+        queried = np.flatnonzero(wanted).tolist()
+        if not queried:
             return 0
-        for k in asked:
+        for k in queried:
             if (mesh := self._meshes[k]) is not None:
                 mesh.refit()
         self._find_normals.launch()
@@ -323,6 +331,7 @@ class Bench:
         return min(int(self._count[0]), len(self.samples.vertex))
 
     def _overlaps(self, count: int) -> Overlaps:
+        """The first ``count`` samples as arrays of their own."""
         s = self.samples
         vertex, own, other, depth, ratio = (
             a.numpy()[:count].copy() for a in (s.vertex, s.own, s.other, s.depth, s.ratio)
@@ -331,6 +340,7 @@ class Bench:
 
 
 def _no_samples(room: int) -> Any:
+    """The kernels' struct ``touch_samples.Samples`` with capacity for ``room`` samples."""
     import warp as wp
     from warpjld_kernels.touch_samples import Samples
 

@@ -1,6 +1,7 @@
-"""Skin that lies inside rigid objects, flattened on them: only the skin gives way.
+"""Flattening of skin that lies inside rigid objects onto their surfaces: only the skin is displaced.
 
-A display of contact, as all of TOUCH: no force is found, and an object is never moved. Contact that is solved is PRESS.
+A geometric display of contact, as all of TOUCH: no forces are computed, and objects do not move. Contact with forces is
+PRESS.
 """
 
 from __future__ import annotations
@@ -20,44 +21,47 @@ from warpjld.touch.touch import Touch, Touched
 
 __all__ = ["flatten_on"]
 
-_CLEARANCE = 0.02  # of the thickness between skin and object: faces of a round object would else show through
-_SOFT = 0.05  # shares of depth over which it comes
-_HIGHEST = 0.5  # shares that a bulge is high at most
-_WIDE = 4  # smoothings: how far it reaches
-_OFTEN = 2  # the bulge is laid on the object in its turn
+_CLEARANCE = 0.02  # distance between skin and object relative to the thickness, so that round objects stay hidden
+_SOFT = 0.05  # depth, in units of what skin can yield, over which the clearance sets in
+_HIGHEST = 0.5  # largest height of a bulge, in the same unit
+_WIDE = 4  # smoothing steps, which determine the width of a bulge
+_OFTEN = 2  # flattening passes: the second flattens the bulge of the first
 
 
 def flatten_on(
     touch: Touch, points: NDArray[np.float32], objects: ObjectSet, places: Sequence[Places], *, first: int = 0
 ) -> tuple[NDArray[np.float32], list[Touched]]:
-    """Lay skin that is inside objects on their surfaces.
+    """Move skin that is inside objects onto their surfaces.
 
-    Vertices move to the nearest point of the object and a little beyond; what that takes of the flesh's volume bulges
-    beside it. Overlaps deeper than skin can give way to fade out, part by part, as those of two parts do, and are told.
+    Vertices move to the closest point of the object and a little beyond; the volume lost by that bulges beside it. The
+    displacement fades out, part by part, with overlaps deeper than skin can yield, which are reported.
 
     Args:
-        touch: Of the surface.
+        touch: Contact of the surface.
         points: Deformed vertices [m], shape (F, V, 3).
         objects: Rigid objects.
-        places: Of every object its F places.
-        first: Number of the first frame, for what is told.
+        places: F places of every object.
+        first: Number of the first frame, for reports.
 
     Returns:
-        The vertices, bit for bit the same where nothing is near an object; and the deepest overlap of every part and
-        frame that is too deep.
+        The vertices, unchanged to the bit away from objects; and the deepest overlap of every part and frame where it
+        is deeper than skin can yield.
+
+    Raises:
+        InputError: Numbers of places or vertices that do not match.
     """
     frames, count = points.shape[:2]
-    if len(places) != len(objects) or any(len(one) != frames for one in places):
+    if len(places) != len(objects) or any(len(of_object) != frames for of_object in places):
         raise InputError(f"touch: want {frames} places for each of {len(objects)} objects")
     if count != len(touch.patches.part):
         raise InputError(f"touch: want {len(touch.patches.part)} vertices, got {count}")
     out = np.array(points, dtype=np.float32)
-    told: list[Touched] = []
-    for number, one in enumerate(places):
+    reported: list[Touched] = []
+    for number, of_object in enumerate(places):
         for sweep in range(_OFTEN):
-            moved, deep = _laid(touch, out, objects, number, one, first)
+            moved, deep = _flattened(touch, out, objects, number, of_object, first)
             if sweep == 0:
-                told += deep
+                reported += deep
             changed = np.flatnonzero((moved != out).any(axis=(1, 2)))
             if sweep + 1 < _OFTEN:
                 for f in changed.tolist():
@@ -65,12 +69,13 @@ def flatten_on(
             out = moved
             if not len(changed):
                 break
-    return out, told
+    return out, reported
 
 
-def _laid(
+def _flattened(
     touch: Touch, points: NDArray[np.float32], objects: ObjectSet, number: int, places: Places, first: int
 ) -> tuple[NDArray[np.float32], list[Touched]]:
+    """Vertices moved out of one object, and overlaps that are too deep."""
     patches = touch.patches
     farthest = 2.0 * float(patches.thickness.max())
     found = objects.distances(points, which=number, places=places, limit=farthest, nearest=True)
@@ -78,25 +83,25 @@ def _laid(
     depth = np.where(found.face >= 0, np.maximum(-found.distance, 0.0), 0.0).astype(np.float64)
     ratio = depth / (SHARE * patches.thickness)
     names = len(patches.names)
-    out, told = points.copy(), []
+    out, reported = points.copy(), []
     for f in np.flatnonzero(depth.any(axis=1)).tolist():
         deepest = np.zeros(names)
         np.maximum.at(deepest, patches.part, ratio[f])
         around = np.where(patches.joined, deepest, 0.0).max(axis=1)
         shown = fade(around)[patches.part] * (patches.give > 0.0)
         inside = np.flatnonzero((depth[f] > 0.0) & (shown > 0.0))
-        way = found.point[f, inside] - points[f, inside]
-        length = np.linalg.norm(way, axis=1)
+        shift = found.point[f, inside] - points[f, inside]
+        length = np.linalg.norm(shift, axis=1)
         beyond = _CLEARANCE * patches.thickness[inside] * np.minimum(ratio[f, inside] / _SOFT, 1.0)
-        out[f, inside] += (shown[inside] * (1.0 + beyond / np.maximum(length, 1e-12)))[:, None] * way
+        out[f, inside] += (shown[inside] * (1.0 + beyond / np.maximum(length, 1e-12)))[:, None] * shift
         for part in np.flatnonzero(deepest > 1.0).tolist():
             deep = float(depth[f, patches.part == part].max())
-            told.append(Touched(patches.names[part], objects.objects[number].name, first + f, deep))
-    return out, told
+            reported.append(Touched(patches.names[part], objects.objects[number].name, first + f, deep))
+    return out, reported
 
 
 def _bulged(touch: Touch, before: NDArray[np.float32], after: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The volume that a displacement took from every part given back around where it was taken."""
+    """Vertices (V, 3) after a displacement, with the volume it took from each part restored by a bulge around it."""
     patches, smooth = touch.patches, touch.smooth
     shift = after.astype(np.float64) - before
     size = np.linalg.norm(shift, axis=1)
@@ -108,7 +113,7 @@ def _bulged(touch: Touch, before: NDArray[np.float32], after: NDArray[np.float32
     a, b, c = (before[faces[:, k]].astype(np.float64) for k in range(3))
     turns = np.cross(b - a, c - a) / 6.0
     around = np.stack([np.bincount(faces.ravel(), np.repeat(turns[:, k], 3), len(before)) for k in range(3)], axis=1)
-    # sideways: towards the object it would be laid back at once
+    # perpendicular to the displacement: a bulge towards the object would be flattened again
     away = unit(smooth @ shift)
     normals = vertex_normals(before, faces).astype(np.float64)
     aside = normals - (normals * away).sum(axis=1, keepdims=True) * away

@@ -1,4 +1,4 @@
-"""Arrays and launches on the processor, as the kernels of touch take them."""
+"""Warp arrays and recorded kernel launches on the CPU."""
 
 from __future__ import annotations
 
@@ -11,29 +11,33 @@ __all__ = ["floats", "numbers", "recorded", "starts", "vectors"]
 
 
 def vectors(values: NDArray[np.floating]) -> Any:
+    """A Warp array of vec3 (n,) that owns a copy of values (n, 3)."""
     import warp as wp
 
     return wp.array(np.array(values, dtype=np.float32), dtype=wp.vec3, device="cpu")
 
 
 def recorded(kernel: Any, dim: int | tuple[int, int], inputs: list[Any], outputs: list[Any]) -> Any:
-    """A launch that is prepared once and repeated every frame."""
+    """A kernel launch with fixed arguments, recorded once to be repeated every frame."""
     import warp as wp
 
     return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True)
 
 
 def numbers(values: NDArray) -> Any:
+    """A Warp array of int32."""
     import warp as wp
 
     return wp.array(np.ascontiguousarray(values, dtype=np.int32), dtype=wp.int32, device="cpu")
 
 
 def floats(values: NDArray) -> Any:
+    """A Warp array of float32."""
     import warp as wp
 
     return wp.array(np.ascontiguousarray(values, dtype=np.float32), dtype=float, device="cpu")
 
 
 def starts(lengths: ArrayLike) -> Any:
+    """Row pointers of a CSR layout, shape (n + 1,), from the rows' lengths (n,)."""
     return numbers(np.concatenate([[0], np.cumsum(np.asarray(lengths, dtype=np.int64))]))

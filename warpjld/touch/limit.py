@@ -1,4 +1,4 @@
-"""Digits that close only until they touch: how far each may bend, against the hand itself."""
+"""Limits of the closing of digits: each bends only until it touches the rest of the hand or body."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ if TYPE_CHECKING:
 
 __all__ = ["LimitedDigit", "close_until_touch"]
 
-_ALLOWED = 0.5  # of what skin can give way to: what is left after parting then bulges little
-_BESIDE = 0.4  # how much overlaps of two digits count: beside one another they overlap however far they open
-_SCAN = 10  # steps in which a digit is opened until it is free
-_STEPS = 7  # halvings of the last: 1/1280 of a digit's bend; what is left is interpolated where depth is measured
-_FASTEST = 2.0  # times as fast as the hand moves a digit may open or close beside its pose
+_ALLOWED = 0.5  # depth that a digit may overlap, relative to what skin can yield; its separation then bulges little
+_BESIDE = 0.4  # factor of overlaps between two digits: side by side they overlap regardless of their flexion
+_SCAN = 10  # steps of the scan that opens a digit until it is free
+_STEPS = 7  # bisections of the last scan step: 1/1280 of a digit's bend; depths are interpolated from there
+_FASTEST = 2.0  # largest rate of a digit's change of share, relative to the motion of the digits
 _BLOCK = 32  # frames searched at once
-_STILL = 1e-6  # rad: a digit that is bent less cannot be opened
+_STILL = 1e-6  # rotation from rest [rad] below which a digit cannot be opened
 
 
 @dataclass(frozen=True)
 class LimitedDigit:
-    """A digit that was closed less than its pose says.
+    """A digit that was closed less than posed in one frame.
 
     Attributes:
-        digit: E.g. ``left.index``.
+        digit: Name, e.g. ``left.index``.
         frame: Frame number.
-        depth: How deep it would have been [m].
-        share: Of its bend that is left, 0…1.
+        depth: Penetration depth in the original pose [m].
+        share: Share of its joints' rotation from rest that is kept, 0…1.
         flexion: Sum of its joints' flexion at which it touches [degrees].
-        other: What it would have been inside of; empty where its faces only crossed.
-        crosses: Whether it crosses something all the same, however far it opens.
+        other: Part it penetrates in the original pose; empty where its faces only crossed.
+        crosses: Whether it still crosses another part, however far it opens.
     """
 
     digit: str
@@ -57,24 +57,24 @@ class LimitedDigit:
 def close_until_touch(
     covering: Covering, poses: Poses, touch: Touch, *, first: int = 0
 ) -> tuple[Poses, list[LimitedDigit]]:
-    """Poses whose digits are bent only as far as they touch.
+    """Poses whose digits are bent only until they touch, and the digits that this changed.
 
-    The joints of a digit turn back together, by one share of their rotation from rest: as little as makes its deepest
-    overlap half of what skin can give way to, and leaves no face of it crossing another once that was parted. Digits
-    are taken one after another, from index to pinky and the thumb last, each against the palm, the body and the digits
-    before it as they were left: so each share is a root of its own, which moves as the motion does. A digit that
-    touches nothing keeps its pose exactly; one that crosses something however far it opens is not opened for that.
+    The joints of a digit turn back together, by a common share of their rotation from rest: the least for which its
+    deepest overlap is half of what skin can yield, and no face of it crosses another after separation. Digits are
+    processed in turn, from index to pinky and the thumb last, each against the palm, the body and the limited digits
+    before it, so that each share is the root of a scalar equation, which varies continuously with the motion. A digit
+    that touches nothing keeps its pose exactly; one that crosses something however far it opens is not opened for that.
 
     Args:
         covering: The hand or body.
         poses: F poses.
         touch: Its contact.
-        first: Number of the first frame, for what is told.
+        first: Number of the first frame, for reports.
     """
     digits = _digits(covering)
-    told: list[LimitedDigit] = []
+    reported: list[LimitedDigit] = []
     if not digits:
-        return poses, told
+        return poses, reported
     searched = [_block(covering, poses[k : k + _BLOCK], touch, digits) for k in range(0, len(poses), _BLOCK)]
     moved = _motion(covering, poses, digits)
     limited = poses
@@ -85,16 +85,23 @@ def close_until_touch(
         for f in np.flatnonzero((share < 1.0) | stuck).tolist():
             flexion = float(np.degrees(limited.flexion[f, digit.joints].sum()))
             name = covering.fans[int(other[f])].name if other[f] >= 0 else ""
-            told.append(
+            reported.append(
                 LimitedDigit(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name, bool(stuck[f]))
             )
-    return limited, told
+    return limited, reported
 
 
 @dataclass(frozen=True, eq=False)
 class _Digit:
-    """A digit, its joints and its parts; ``counts`` of parts that it is closed against, itself among them; ``fingers``
-    of the parts of any digit."""
+    """A digit and masks of parts.
+
+    Attributes:
+        name: Name, e.g. ``left.index``.
+        joints: Its joints.
+        parts: Its own parts, shape (P,).
+        counts: Parts that it is closed against, its own included, shape (P,).
+        fingers: Parts of all digits, shape (P,).
+    """
 
     name: str
     joints: list[int]
@@ -104,60 +111,60 @@ class _Digit:
 
 
 def _digits(covering: Covering) -> list[_Digit]:
-    """In the order in which they are closed; metacarpals are the palm's."""
+    """Digits in the order in which they are limited; metacarpals belong to the palm."""
     parts = [fan.name for fan in covering.fans]
     found = []
     for name, joints in digit_joints(covering.skeleton).items():
-        mine = np.array([part.startswith(f"{name}.") for part in parts])
-        if mine.any():
-            found.append((name, list(joints), mine))
+        own = np.array([part.startswith(f"{name}.") for part in parts])
+        if own.any():
+            found.append((name, list(joints), own))
     order = ("index", "middle", "ring", "pinky", "thumb")
-    found.sort(key=lambda one: order.index(one[0].rpartition(".")[2]))
+    found.sort(key=lambda digit: order.index(digit[0].rpartition(".")[2]))
     later = np.zeros(len(parts), dtype=bool)
-    fingers = np.logical_or.reduce([mine for _, _, mine in found]) if found else later
+    fingers = np.logical_or.reduce([own for _, _, own in found]) if found else later
     out = []
-    for name, joints, mine in reversed(found):
-        out.append(_Digit(name, joints, mine, ~later, fingers))
-        later = later | mine
+    for name, joints, own in reversed(found):
+        out.append(_Digit(name, joints, own, ~later, fingers))
+        later = later | own
     return out[::-1]
 
 
 def _block(covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit]) -> list[tuple[NDArray, ...]]:
-    """Of every digit the share of its bend that it keeps, whether it crosses something all the same, and
-    :func:`_depths` of the poses as they are."""
+    """For every digit the share of its rotation that it keeps, whether it still crosses something, and
+    :func:`_depths` of the original poses, arrays of shape (F,)."""
     share = [np.ones(len(poses)) for _ in digits]
     found = touch.measured(covering.deform(poses), poses)
     depth = [_depths(found, digit) for digit in digits]
     for n, digit in enumerate(digits):
 
-        def over(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
-            return _depths(touch.measured(covering.deform(some), some), digit)[0] - _ALLOWED
+        def over(tried: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
+            return _depths(touch.measured(covering.deform(tried), tried), digit)[0] - _ALLOWED
 
         left = _search(covering, poses, digit, _depths(found, digit)[0] - _ALLOWED, over, interpolated=True)
         if (left < 1.0).any():
             share[n] *= left
             poses = _bent(covering, poses, digit.joints, left)
             found = touch.measured(covering.deform(poses), poses)
-    # once more against all: skin that is parted from what comes later may cross what came before
-    for tried in (digits, [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]):
-        crossing = _crossing(covering, touch, poses, tried)
-        for n, digit in enumerate(tried):
+    # a second time against all parts: skin separated from a later digit may cross an earlier one
+    for against in (digits, [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]):
+        crossing = _crossing(covering, touch, poses, against)
+        for n, digit in enumerate(against):
             if not crossing[n].any():
                 continue
 
-            def crosses(some: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
-                return np.where(_crossing(covering, touch, some, [digit])[0], 1.0, -1.0)
+            def crosses(tried: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
+                return np.where(_crossing(covering, touch, tried, [digit])[0], 1.0, -1.0)
 
             left = _search(covering, poses, digit, np.where(crossing[n], 1.0, -1.0), crosses, interpolated=False)
             if (left < 1.0).any():
                 share[n] *= left
                 poses = _bent(covering, poses, digit.joints, left)
-                crossing = _crossing(covering, touch, poses, tried)
+                crossing = _crossing(covering, touch, poses, against)
     return [(kept, stuck, *of) for kept, stuck, of in zip(share, crossing, depth, strict=True)]
 
 
 def _motion(covering: Covering, poses: Poses, digits: list[_Digit]) -> NDArray[np.float64]:
-    """How far the joints of digits turn from the frame before, the largest of them [rad], shape (F,)."""
+    """Largest rotation of any digit's joint from the frame before [rad], shape (F,)."""
     joints = [j for digit in digits for j in digit.joints]
     parents = [max(int(covering.skeleton.parents[j]), 0) for j in joints]
     local = multiply(conjugate(poses.rotations[:, parents]), poses.rotations[:, joints])
@@ -167,8 +174,13 @@ def _motion(covering: Covering, poses: Poses, digits: list[_Digit]) -> NDArray[n
 
 
 def _steady(share: NDArray[np.float64], moved: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The largest shares, none above those given, that change no faster than the motion: whether single faces cross
-    may flicker from frame to frame, and digits must not."""
+    """The largest shares (F,) below those given that change at a bounded rate, since crossings of single faces may
+    flicker from frame to frame.
+
+    Args:
+        share: Shares, shape (F,).
+        moved: Motion from the frame before, relative to the digit's rotation from rest, shape (F,).
+    """
     out = share.copy()
     for f in range(1, len(out)):
         out[f] = min(out[f], out[f - 1] + _FASTEST * moved[f])
@@ -186,18 +198,22 @@ def _search(
     *,
     interpolated: bool,
 ) -> NDArray[np.float64]:
-    """Share of its bend that a digit keeps in every frame, so that a measure is not above nought; 1 where it is not
-    anyhow, or is above it however far the digit opens.
+    """Largest share of a digit's rotation from rest for which a measure is not positive, shape (F,); 1 where it is not
+    positive in the original pose, or positive however far the digit opens.
 
     Args:
-        over: The measure of the poses as they are.
-        interpolated: Whether the measure is continuous: then the last interval is cut where it would be nought.
+        covering: The hand or body.
+        poses: F poses.
+        digit: The digit that is opened.
+        over: The measure in the original poses, shape (F,).
+        measure: The measure of n poses, shape (n,).
+        interpolated: Whether the measure is continuous: then its zero in the last interval is interpolated.
     """
     out = np.ones(len(poses))
     frames = np.flatnonzero((over > 0.0) & (_bend(covering, poses, digit.joints) > _STILL))
     if not len(frames):
         return out
-    # opened by and by: some cross at first what they are clear of later, and then again what lies behind them
+    # scan from closed to open, since the measure may change its sign more than once
     low, high, at_low, at_high = np.ones(len(frames)), np.ones(len(frames)), over[frames], over[frames]
     for share in np.linspace(1.0, 0.0, _SCAN + 1)[1:]:
         rows = np.flatnonzero(at_low > 0.0)
@@ -209,10 +225,10 @@ def _search(
     opens = at_low <= 0.0
     frames = frames[opens]
     low, high, at_low, at_high = low[opens], high[opens], at_low[opens], at_high[opens]
-    some = _picked(poses, frames)
+    picked = _picked(poses, frames)
     for _ in range(_STEPS if len(frames) else 0):
         middle = 0.5 * (low + high)
-        at = measure(_bent(covering, some, digit.joints, middle))
+        at = measure(_bent(covering, picked, digit.joints, middle))
         free = at <= 0.0
         low, at_low = np.where(free, middle, low), np.where(free, at, at_low)
         high, at_high = np.where(free, high, middle), np.where(free, at_high, at)
@@ -223,7 +239,7 @@ def _search(
 
 
 def _bend(covering: Covering, poses: Poses, joints: list[int]) -> NDArray[np.float64]:
-    """Largest rotation of a digit's joints from rest in every frame [rad]."""
+    """Largest rotation of a digit's joints from rest in every frame [rad], shape (F,)."""
     parents = [max(int(covering.skeleton.parents[j]), 0) for j in joints]
     local = multiply(conjugate(poses.rotations[:, parents]), poses.rotations[:, joints])
     return np.asarray(Rotation.from_quat(local.reshape(-1, 4)).magnitude().reshape(local.shape[:2]).max(axis=1))
@@ -232,13 +248,13 @@ def _bend(covering: Covering, poses: Poses, joints: list[int]) -> NDArray[np.flo
 def _depths(
     overlaps: list[Overlaps], digit: _Digit
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Deepest overlap of a digit with what counts for it in every frame: in shares of what skin can give way to, in
-    metres, and the other part, -1 for none."""
+    """Deepest overlap of a digit with the parts it is closed against, in every frame, shape (F,) each: relative to what
+    skin can yield, in metres, and the other part, -1 for none."""
     count = len(overlaps)
     ratio, depth, other = np.zeros(count), np.zeros(count), np.full(count, -1)
     for f, found in enumerate(overlaps):
-        mine, its = digit.parts[found.part], digit.parts[found.other]
-        rows = np.flatnonzero((mine | its) & digit.counts[found.part] & digit.counts[found.other])
+        inside, around = digit.parts[found.part], digit.parts[found.other]
+        rows = np.flatnonzero((inside | around) & digit.counts[found.part] & digit.counts[found.other])
         if len(rows):
             beside = ~(digit.parts[found.part[rows]] & digit.parts[found.other[rows]])
             beside &= digit.fingers[found.part[rows]] & digit.fingers[found.other[rows]]
@@ -250,25 +266,30 @@ def _depths(
 
 
 def _crossing(covering: Covering, touch: Touch, poses: Poses, digits: list[_Digit]) -> NDArray[np.bool_]:
-    """Whether a face of a digit crosses another that counts for it once skin was parted, shape (digits, F)."""
+    """Whether a face of a digit crosses one of the parts it is closed against after separation, shape (digits, F)."""
     part = touch.patches.part[touch.patches.faces]
     parted, _ = touch.parted(covering.deform(poses), poses)
-    mine = np.array([digit.parts[part].any(axis=1) for digit in digits])
+    own = np.array([digit.parts[part].any(axis=1) for digit in digits])
     counts = np.array([digit.counts[part].all(axis=1) for digit in digits])
     out = np.zeros((len(digits), len(poses)), dtype=bool)
     for f, points in enumerate(parted):
-        near = np.flatnonzero(_beside(points[touch.patches.faces], mine))
+        near = np.flatnonzero(_beside(points[touch.patches.faces], own))
         pairs = touch.new_crossings(near[crossing_faces(points, touch.patches.faces[near]).pairs])
-        found = np.logical_and(mine[:, pairs].any(axis=2), counts[:, pairs].all(axis=2))
+        found = np.logical_and(own[:, pairs].any(axis=2), counts[:, pairs].all(axis=2))
         out[:, f] = np.asarray(found).any(axis=1)
     return out
 
 
-def _beside(corners: NDArray[np.floating], mine: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Faces (T, 3, 3) in the box of any of some digits' faces (digits, T): no other can cross them, shape (T,)."""
+def _beside(corners: NDArray[np.floating], own: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which faces overlap the bounding box of some digit's faces, shape (T,); no others can cross them.
+
+    Args:
+        corners: Corners of the faces [m], shape (T, 3, 3).
+        own: Faces of every digit, shape (digits, T).
+    """
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     out = np.zeros(len(corners), dtype=bool)
-    for faces in mine:
+    for faces in own:
         low, high = lower[faces].min(axis=0), upper[faces].max(axis=0)
         out |= (lower <= high).all(axis=1) & (upper >= low).all(axis=1)
     return out
@@ -279,18 +300,18 @@ def _picked(poses: Poses, frames: NDArray[np.int64]) -> Poses:
 
 
 def _bent(covering: Covering, poses: Poses, joints: list[int], share: NDArray[np.float64]) -> Poses:
-    """Poses with some joints at a share (F,) of their rotation from rest; bones keep the poses' lengths, and frames at
-    a share of 1 every bit."""
+    """Poses with some joints at a share (F,) of their rotation from rest. Bone lengths are kept, and frames at a share
+    of 1 are unchanged to the bit."""
     frames = np.flatnonzero(share < 1.0)
     if not len(frames):
         return poses
-    skeleton, some = covering.skeleton, _picked(poses, frames)
-    positions, rotations, local = some.positions.copy(), some.rotations.copy(), some.rotations.copy()
+    skeleton, picked = covering.skeleton, _picked(poses, frames)
+    positions, rotations, local = picked.positions.copy(), picked.rotations.copy(), picked.rotations.copy()
     changed = np.isin(np.arange(len(skeleton)), joints)
     for j, parent in enumerate(skeleton.parents.tolist()):
         if parent < 0:
             continue
-        local[:, j] = multiply(conjugate(some.rotations[:, parent]), some.rotations[:, j])
+        local[:, j] = multiply(conjugate(picked.rotations[:, parent]), picked.rotations[:, j])
         if j in joints:
             vector = share[frames, None] * Rotation.from_quat(local[:, j]).as_rotvec()
             local[:, j] = Rotation.from_rotvec(vector).as_quat()
@@ -298,7 +319,8 @@ def _bent(covering: Covering, poses: Poses, joints: list[int], share: NDArray[np
         if changed[j] or changed[parent]:
             changed[j] = True
             rotations[:, j] = multiply(rotations[:, parent], local[:, j])
-            offset = rotate(conjugate(some.rotations[:, parent]), some.positions[:, j] - some.positions[:, parent])
+            along = picked.positions[:, j] - picked.positions[:, parent]
+            offset = rotate(conjugate(picked.rotations[:, parent]), along)
             positions[:, j] = positions[:, parent] + rotate(rotations[:, parent], offset)
     out = Poses(poses.positions.copy(), poses.rotations.copy(), poses.flexion.copy())
     out.positions[frames], out.rotations[frames] = positions, rotations

@@ -1,4 +1,4 @@
-"""The parts of a surface that may meet: one a segment, and how thick the flesh is there."""
+"""Decomposition of a surface into parts that may touch, one per operator, and the thickness of their flesh."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ if TYPE_CHECKING:
 
 __all__ = ["Patches", "half_width", "neighbours", "patches_of", "segment_distance"]
 
-_COARSEST = 2.2  # of a part's thickness that its edges may be long
-_THINNEST = 0.5  # of a part's median thickness: bones that run along the skin must not make it count as thin
+_COARSEST = 2.2  # largest length of a part's edges relative to its thickness
+_THINNEST = 0.5  # smallest thickness relative to the part's median, where bones run along the skin
 
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """A surface cut into parts.
+    """A surface divided into P parts.
 
     Attributes:
-        faces: Triangles of the whole, shape (T, 3).
+        faces: Triangles of the whole surface, shape (T, 3).
         part: Part of every vertex, shape (V,).
         names: Names of the parts.
         thickness: Depth of the flesh [m], shape (V,): to the bone, or to the middle where that is nearer.
-        give: Compliance of every vertex, a number without unit: of two that meet each gives way by its share.
-        joints: Pairs of parts that meet at a joint, whether or not the surface joins them.
-        bones: Of every part the joints at the ends of its segments; none without a skeleton.
+        give: Relative compliance of every vertex, without unit, shape (V,): two sides in contact are displaced in
+            proportion to theirs.
+        joints: Pairs of parts that meet at a joint, whether or not they share edges.
+        bones: Joints at the ends of every part's segments; empty without a skeleton.
     """
 
     faces: NDArray[np.int32]
@@ -47,17 +48,17 @@ class Patches:
 
     @cached_property
     def linked(self) -> csr_array:
-        """Which vertices an edge joins, shape (V, V)."""
+        """Adjacency matrix of the vertices, shape (V, V)."""
         return neighbours(self.faces, len(self.part))
 
     @cached_property
     def shell(self) -> NDArray[np.int32]:
-        """Number of the connected piece of surface that every vertex is of, shape (V,)."""
+        """Connected component of every vertex, shape (V,)."""
         return np.asarray(connected_components(self.linked, directed=False)[1], dtype=np.int32)
 
     @cached_property
     def joined(self) -> NDArray[np.bool_]:
-        """Which parts are the same, share an edge or meet at a joint, shape (P, P): they meet there alone."""
+        """Whether two parts are the same, share an edge or meet at a joint, shape (P, P); these are not separated."""
         out = np.eye(len(self.names), dtype=bool)
         for a, b in self.joints:
             out[a, b] = out[b, a] = True
@@ -67,23 +68,26 @@ class Patches:
         return out
 
     def coarse(self, edge: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Parts whose edges, as long as ``edge`` [m] at every vertex, are longer than their flesh is thick, shape (P,).
+        """Parts whose edges are too long for the thickness of their flesh, shape (P,).
 
-        Nothing can be parted there: faces reach through the flesh from one side to the other.
+        They cannot be separated, since faces reach through the flesh from one side to the other.
+
+        Args:
+            edge: Mean edge length at every vertex [m], shape (V,).
         """
         ratio = edge / np.maximum(self.thickness, 1e-300)
         usual = [np.median(ratio[self.part == k]) if (self.part == k).any() else 0.0 for k in range(len(self.names))]
         return np.array(usual) > _COARSEST
 
     def spaced(self, vertices: NDArray[np.floating], distance: float) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Vertices that are some way apart from one another in their part, and of every vertex the nearest of them.
+        """Choose vertices at a minimum distance from each other in each part (Poisson-disk sampling in index order).
 
         Args:
-            vertices: Of the surface [m], shape (V, 3).
-            distance: How far apart, in parts of a part's median thickness.
+            vertices: Vertex positions [m], shape (V, 3).
+            distance: Minimum distance relative to the part's median thickness.
 
         Returns:
-            Which they are, and their numbers, both of shape (V,).
+            Mask of the chosen vertices, and the nearest chosen vertex of every vertex, both of shape (V,).
         """
         chosen, nearest = np.zeros(len(vertices), dtype=bool), np.arange(len(vertices))
         for k in range(len(self.names)):
@@ -96,13 +100,13 @@ class Patches:
                 if free[i]:
                     free[tree.query_ball_point(point, reach)] = False
                     chosen[rows[i]] = True
-            some = rows[chosen[rows]]
-            nearest[rows] = some[cKDTree(vertices[some]).query(points)[1]]
+            kept = rows[chosen[rows]]
+            nearest[rows] = kept[cKDTree(vertices[kept]).query(points)[1]]
         return chosen, nearest
 
     def mesh(self, part: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Faces of a part and of one ring around it, shape (N, 3), so that what lies at the part's own border is not at
-        the mesh's; and 0 for corners on the mesh's border, else 1, likewise."""
+        """Faces of a part with one ring around it, shape (N, 3), so that the part's border is not the mesh's boundary;
+        and 0 for corners on the mesh's boundary, else 1, shape (N, 3)."""
         inside = self.part == part
         inside = inside | (self.linked @ inside.astype(float) > 0)
         faces = self.faces[inside[self.faces].all(axis=1)]
@@ -122,14 +126,14 @@ def patches(
     joints: tuple[tuple[int, int], ...] = (),
     bones: tuple[tuple[tuple[int, int], ...], ...] = (),
 ) -> Patches:
-    """Patches of given parts."""
+    """Patches of given parts; arguments as the attributes of :class:`Patches`, compliance 1 by default."""
     usual = np.array([np.median(thickness[part == k]) if (part == k).any() else 0.0 for k in range(len(names))])
     thick = np.maximum(thickness, _THINNEST * usual[part])
     return Patches(faces, part, names, thick, np.ones(len(part)) if give is None else give, joints, bones)
 
 
 def patches_of(covering: Covering) -> Patches:
-    """A covering's patches: every vertex belongs to the operator that holds most of it."""
+    """Patches of a covering: every vertex belongs to the operator with the largest weight."""
     part = covering.domains.argmax(axis=1).astype(np.int32)
     skeleton = covering.skeleton
     segments = [(s.proximal, s.distal) for s in skeleton.segments]
@@ -147,9 +151,9 @@ def patches_of(covering: Covering) -> Patches:
 
 
 def half_width(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Half of how wide the flesh is under every vertex [m], shape (V,): beyond it the way out is on the other side.
+    """Half of the width of the flesh beneath every vertex [m], shape (V,): at larger depths the other side is nearer.
 
-    Along the inward normal, and the least of a vertex and those next to it: rays of single vertices stray.
+    Measured along the inward normal; the smallest value of a vertex and its neighbours, since single rays may stray.
     """
     import warp as wp
     from warpjld_kernels.touch_thickness import measure_width
@@ -182,7 +186,7 @@ def segment_distance(
 
 
 def neighbours(faces: NDArray[np.int32], count: int) -> csr_array:
-    """Which vertices an edge joins, 1 each way, shape (V, V)."""
+    """Adjacency matrix of the vertices, symmetric, with entries 1, shape (V, V)."""
     i = faces[:, [0, 1, 2, 1, 2, 0]].ravel()
     j = faces[:, [1, 2, 0, 0, 1, 2]].ravel()
     out = csr_array((np.ones(len(i)), (i, j)), shape=(count, count))

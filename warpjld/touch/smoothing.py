@@ -1,4 +1,4 @@
-"""A fixed smoothing of fields over a surface, of finite reach: what it does not reach stays exactly as it is."""
+"""Smoothing matrices of compact support for fields on a surface: values beyond their reach are exactly unchanged."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from warpjld.touch.patches import Patches, neighbours
 
 __all__ = ["edge_lengths", "skin_smoothing", "smoothing"]
 
-_REACH = 0.25  # of the thickness: how far from a displacement its volume is given back
-_MOST = 8  # Jacobi steps: beyond that a row reaches over hundreds of vertices
-_LEAST = 0.05  # of a row's largest entry: what is less is dropped
+_REACH = 0.25  # radius of smoothing relative to the thickness
+_MOST = 8  # largest number of Jacobi steps; with more a row has hundreds of entries
+_LEAST = 0.05  # entries smaller than this share of a row's largest are dropped
 
 
 def edge_lengths(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -25,17 +25,17 @@ def edge_lengths(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDA
 
 
 def skin_smoothing(vertices: NDArray[np.float64], patches: Patches) -> csr_array:
-    """Rows that smooth a field over a surface on the scale of its thickness, shape (V, V)."""
+    """Smoothing matrix with the thickness of the flesh as its length scale, shape (V, V)."""
     edge = edge_lengths(vertices, patches.faces)
-    # one ring of faces at least: what coarse faces give way by is given back on the next
+    # at least one ring of faces, so that on a coarse mesh volume can be restored on the neighbouring faces
     return smoothing(vertices, patches.faces, np.maximum(_REACH * patches.thickness, edge))
 
 
 def smoothing(vertices: NDArray[np.float64], faces: NDArray[np.int32], reach: NDArray[np.float64]) -> csr_array:
-    """Rows that average a field over about ``reach`` [m] of every vertex, each summing to one, shape (V, V).
+    """Matrix that averages a field over about ``reach`` [m] of every vertex, rows summing to one, shape (V, V).
 
-    Each step mixes a share a of the neighbours' mean in: after n steps the spread is the edges' length times √(n a).
-    The finest region says how many steps, up to a bound; elsewhere a is less than a half.
+    Each Jacobi step mixes in a share a of the neighbours' mean: after n steps the standard deviation is the edge length
+    times √(n a). The number of steps, up to a bound, follows from the finest region; elsewhere a is less than a half.
     """
     linked = neighbours(faces, len(vertices))
     edge = edge_lengths(vertices, faces)
@@ -48,7 +48,7 @@ def smoothing(vertices: NDArray[np.float64], faces: NDArray[np.int32], reach: ND
     out = step
     for _ in range(steps - 1):
         out = csr_array(out @ step)
-    # far tails are dropped, so that nothing far away moves by a billionth
+    # small entries are dropped, so that distant vertices stay exactly unchanged
     largest = out.max(axis=1).toarray().ravel()
     out.data[out.data < _LEAST * np.repeat(largest, np.diff(out.indptr))] = 0.0
     out.eliminate_zeros()

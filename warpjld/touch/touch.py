@@ -1,9 +1,9 @@
-"""Contact of the skin with itself, displayed: what crosses is parted, and what is displaced bulges beside it.
+"""Self-contact of the skin for display: overlapping parts are separated, and the displaced volume bulges beside them.
 
-No forces and no equilibrium: contact that is solved is PRESS (:mod:`warpjld.simulation`). Both sides of every bent
-joint are parted at the plane that halves its angle. Then vertices that lie inside another part are found; each gives a
-plane in which it and that part are to meet, and both sides are moved to theirs by a least squares fit to the planes
-around, which is smooth over the surface. The volume that this takes is given back around it.
+Without forces or equilibrium: contact with forces is PRESS (:mod:`warpjld.simulation`). The two sides of every bent
+joint are separated at its bisecting plane. Then vertices that lie inside another part are found; each defines a plane
+in which it and that part shall meet, and both sides are moved by a least squares fit to the planes around, which is
+smooth over the surface. The volume lost by this is restored around it.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 
 __all__ = ["SHARE", "Touch", "Touched"]
 
-_NOISE = 1e-6  # of the surface's size
-_SPLIT_BELOW = 8_000  # vertex-frames a thread must have before splitting pays
+_NOISE = 1e-6  # margin of overlaps at rest, relative to the surface's size
+_SPLIT_BELOW = 8_000  # smallest number of vertices × frames worth a thread of its own
 
 
 @dataclass(frozen=True)
 class Touched:
-    """The deepest overlap of one part in one frame that is deeper than skin can give way to.
+    """The deepest overlap of one part in one frame, where it is deeper than skin can yield.
 
     Attributes:
         part: The part, e.g. ``left.index.knuckle2``.
-        other: What it is inside of.
+        other: Part or object that it lies inside.
         frame: Frame number.
         depth: Depth [m].
     """
@@ -54,13 +54,16 @@ class Touched:
 
 
 class Touch:
-    """Parts what crosses on a covering's deformed surface; made once, applied to any frames.
+    """Separation of overlapping parts of a covering's deformed surface; made once, applied to any frames.
 
     Args:
         patches: The surface's parts.
-        vertices: Rest positions [m], shape (V, 3). What overlaps there already stays as it is, to that depth.
-        creases: The joints whose two sides are parted; none without.
-        joints: Rest positions of the joints that the patches' bones name [m], shape (J, 3).
+        vertices: Rest positions [m], shape (V, 3). Overlaps at rest are kept, to their depth.
+        creases: The joints whose two sides are separated; none by default.
+        joints: Rest positions of the joints that the patches' bones refer to [m], shape (J, 3).
+
+    Raises:
+        InputError: Compliances that are negative or not finite.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -68,7 +71,7 @@ class Touch:
         >>> for joint, angle in (("index.base", 1.4), ("index.knuckle2", 1.7), ("index.knuckle3", 1.2)):  # rad
         ...     motion.set_key(f"{joint}.flexion", 0, angle)
         >>> poses = motion.poses(hand.skeleton)
-        >>> parted, told = wj.Touch.of(covering).apply(covering.deform(poses), poses)
+        >>> parted, deep = wj.Touch.of(covering).apply(covering.deform(poses), poses)
         >>> parted.shape
         (1, ..., 3)
     """
@@ -96,7 +99,7 @@ class Touch:
         self._model = Model(patches, smooth, None, never, edge, bones, around)
         found = Bench(self._model, vertices).measure(vertices, joints)
         at_rest = np.zeros(count)
-        # a little more than it is: in other positions single precision makes some of it anew
+        # with a margin for single precision, which depends on the position
         noise = _NOISE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
         np.maximum.at(at_rest, found.vertex, 1.001 * found.depth + noise)
         self._model = replace(self._model, at_rest=at_rest, never=never | self._nested(found))
@@ -106,7 +109,8 @@ class Touch:
         return f"Touch({len(self.patches.names)} parts of {len(self._vertices)} vertices)"
 
     def _nested(self, found: Overlaps) -> NDArray[np.bool_]:
-        """Parts of different shells that lie in one another at rest, as pieces of a jointed figure do, shape (P, P)."""
+        """Pairs of parts of different connected components that overlap at rest, as pieces of a jointed doll, shape
+        (P, P)."""
         out = np.zeros((len(self.patches.names),) * 2, dtype=bool)
         shells = [set(self.patches.shell[self.patches.part == k].tolist()) for k in range(len(out))]
         for a, b in {(int(p), int(o)) for p, o in zip(found.part, found.other, strict=True)}:
@@ -115,38 +119,38 @@ class Touch:
 
     @classmethod
     def of(cls, covering: Covering) -> Touch:
-        """Of a covering's own parts, all equally compliant."""
+        """Contact of a covering's own parts, all equally compliant."""
         patches = patches_of(covering)
         vertices, joints = covering.surface.vertices, covering.skeleton.rest
         return cls(patches, vertices, creases=Creases.of(covering, patches), joints=joints)
 
     @property
     def smooth(self) -> csr_array:
-        """Rows that smooth a field over the surface, on the scale of its thickness, shape (V, V)."""
+        """Smoothing matrix with the thickness of the flesh as its length scale, shape (V, V)."""
         return self._model.smooth
 
     def apply(
         self, points: NDArray[np.floating], poses: Poses | None = None, *, first: int = 0, threads: int | None = None
     ) -> tuple[NDArray[np.floating], list[Touched]]:
-        """Part what crosses.
+        """Separate overlapping parts.
 
         Args:
             points: Deformed vertices [m], shape (F, V, 3).
-            poses: The poses they were deformed by; without, joints' two sides are not parted.
-            first: Number of the first frame, for what is told.
+            poses: The poses they were deformed by; without them the two sides of joints are not separated.
+            first: Number of the first frame, for reports.
             threads: CPU threads to split the frames over; by default all cores where that pays.
 
         Returns:
-            The vertices, of the same type, bit for bit the same where nothing is near an overlap; and the overlaps
-            deeper than skin can give way to, the deepest of every part and frame.
+            The vertices, of the same type, unchanged to the bit away from overlaps; and the deepest overlap of every
+            part and frame where it is deeper than skin can yield.
         """
         out, found = self.parted(points, poses, threads=threads)
-        return out, [one for k, some in enumerate(found) for one in self._deep(some, first + k)]
+        return out, [deep for k, overlaps in enumerate(found) for deep in self._deep(overlaps, first + k)]
 
     def parted(
         self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
     ) -> tuple[NDArray[np.floating], list[Overlaps]]:
-        """The same, with all that overlapped in every frame once joints' two sides were parted."""
+        """As :meth:`apply`, with all overlaps of every frame after the two sides of joints were separated."""
         moved, found = self._each(points, poses, threads, Bench.part)
         if points.dtype == np.float32:
             return moved, found
@@ -156,7 +160,7 @@ class Touch:
     def measured(
         self, points: NDArray[np.floating], poses: Poses | None = None, *, threads: int | None = None
     ) -> list[Overlaps]:
-        """What :meth:`apply` would part in every frame."""
+        """Overlaps that :meth:`apply` would separate in every frame."""
         return self._each(points, poses, threads, Bench.measure)[1]
 
     def _each(
@@ -166,7 +170,7 @@ class Touch:
         threads: int | None,
         work: Callable[[Bench, NDArray[np.float32], NDArray[np.float64] | None], Overlaps],
     ) -> tuple[NDArray[np.float32], list[Overlaps]]:
-        """Work on every frame once joints' two sides were parted."""
+        """Apply ``work`` to every frame after separating the two sides of joints; vertices and overlaps of each."""
         count = len(self.patches.part)
         if points.ndim != 3 or points.shape[1:] != (count, 3):
             raise InputError(f"touch: want points of shape (frames, {count}, 3), got {points.shape}")
@@ -196,33 +200,35 @@ class Touch:
         return moved, [found[k] for k in range(len(points))]
 
     def new_crossings(self, pairs: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Of crossing pairs of faces (N, 2) those that do not cross at rest."""
+        """Those pairs of crossing faces (N, 2) that do not cross at rest."""
         count = len(self.patches.faces)
         keys = pairs.astype(np.int64) @ [count, 1]
         return pairs[~np.isin(keys, self._crossing_at_rest)].astype(np.int64)
 
     @cached_property
     def _crossing_at_rest(self) -> NDArray[np.int64]:
+        """One integer for each pair of faces that cross at rest."""
         pairs = crossing_faces(self._vertices, self.patches.faces).pairs
         return np.asarray(pairs.astype(np.int64) @ [len(self.patches.faces), 1])
 
     def _made(self, count: int) -> list[Bench]:
-        """Benches for so many threads; made here, since Warp's meshes may not be made in several threads at once."""
+        """Workspaces for ``count`` threads; Warp's meshes cannot be created in several threads at once."""
         while len(self._benches) < count:
             self._benches.append(Bench(self._model, self._vertices))
         return self._benches[:count]
 
     def _deep(self, found: Overlaps, frame: int) -> list[Touched]:
+        """The deepest overlap of every part, where it is deeper than skin can yield."""
         deep = np.flatnonzero(found.ratio > 1.0)
-        told = {}
-        for i in deep[np.argsort(found.depth[deep])].tolist():  # the deepest last, which stays
+        by_part = {}
+        for i in deep[np.argsort(found.depth[deep])].tolist():  # ascending, so that the deepest remains
             part = self.patches.names[found.part[i]]
-            told[part] = Touched(part, self.patches.names[found.other[i]], frame, float(found.depth[i]))
-        return list(told.values())
+            by_part[part] = Touched(part, self.patches.names[found.other[i]], frame, float(found.depth[i]))
+        return list(by_part.values())
 
 
 def _around(patches: Patches, vertices: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far the mesh of every part is from its bones at most [m], shape (P,)."""
+    """Largest distance of the mesh of every part from its bones [m], shape (P,)."""
     out = np.zeros(len(patches.names))
     for k, bones in enumerate(patches.bones):
         corners = np.unique(patches.mesh(k)[0])
