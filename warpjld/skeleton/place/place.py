@@ -1,4 +1,4 @@
-"""Points proposed in any surface: a body's 87 or a hand's 25, all of them inside."""
+"""Proposal of named points in any surface, a body's 87 or a hand's 25, all of them inside it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ __all__ = ["propose_points"]
 Array = NDArray[np.float64]
 
 _GRID = 170  # voxels in a hand's diagonal
-_SURE = 0.15  # chirality from which a hand's side is told
-_CLOSEST = 4000  # voxels that are tried for a point outside
+_SURE = 0.15  # smallest absolute chirality that decides a hand's side
+_CLOSEST = 4000  # nearest voxels tried for a point that lies outside
 
 
 def propose_points(
@@ -29,14 +29,14 @@ def propose_points(
     Args:
         vertices: Surface in any unit and axes, shape (V, 3); a body stands upright along an axis.
         faces: Its triangles, shape (T, 3).
-        side: ``left`` or ``right``: the surface is that hand. Else a body is looked for, then a hand.
-        label: What messages call it.
+        side: ``left`` or ``right`` if the surface is that hand; otherwise a body is tried first, then a hand.
+        label: Name of the surface in messages.
 
     Returns:
         87 points of a body or 25 of a hand by name [the surface's unit and axes], each shape (3,).
 
     Raises:
-        InputError: It is neither, or does not show what it takes: legs, arms and fingers apart from one another.
+        InputError: It is neither, or its legs, arms or fingers are not apart from one another.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -83,7 +83,7 @@ def _order(points: dict[str, Array]) -> list[str]:
 def _moved_inside(
     points: dict[str, Array], vertices: Array, faces: NDArray[np.integer], solid: VoxelSolid | None
 ) -> dict[str, Array]:
-    """Points in a hollow of the surface, as a mouth, at the nearest place in the flesh."""
+    """Move points that lie outside the surface (in a cavity such as a mouth) to the nearest place in the flesh."""
     names = list(points)
     out = np.flatnonzero(outside_surface(vertices, faces, np.array(list(points.values()))))
     if not len(out):

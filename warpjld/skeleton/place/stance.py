@@ -1,4 +1,4 @@
-"""How a digitised body stands: its up, its left and forward, found from its two legs and its feet."""
+"""Stance of a digitised body: up, left and forward directions, found from its two legs and feet."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ __all__ = ["Stance", "find_stance", "pieces"]
 Array = NDArray[np.float64]
 
 _UPS = ((1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0))
-"""Axes and signs that may be up, the usual ones first."""
-_LEGS = (0.12, 0.2, 0.28, 0.36)  # heights at which there are two legs
-_ALIKE = 1.6  # flesh of one leg per the other's
-_TRUNK = (0.56, 0.64)  # heights at which there is one trunk
+"""Candidates for the up axis: (axis, sign), the usual ones first."""
+_LEGS = (0.12, 0.2, 0.28, 0.36)  # heights, as shares of the whole, at which two legs are expected
+_ALIKE = 1.6  # largest ratio of the two legs' section areas
+_TRUNK = (0.56, 0.64)  # heights at which one trunk is expected
 
 
 @dataclass(frozen=True)
 class Stance:
-    """A body's frame.
+    """Frame of an upright body.
 
     Attributes:
         frame: Rows left, up and forward, shape (3, 3).
@@ -38,16 +38,16 @@ class Stance:
     height: float
 
     def inward(self, points: Array) -> Array:
-        """Points in the body's frame, heights as shares of one: x left, y up, z forward."""
+        """Points in the body's frame, per height of the body: x left, y up, z forward."""
         return (points - self.origin) @ self.frame.T / self.height
 
     def outward(self, points: Array) -> Array:
-        """Back from the body's frame."""
+        """Points back from the body's frame."""
         return points * self.height @ self.frame + self.origin
 
 
 def pieces(solid: VoxelSolid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Connected pieces of some voxels, the largest first."""
+    """Connected components of the chosen voxels, the largest first."""
     numbers = np.flatnonzero(chosen)
     _, label = connected_components(solid.part(chosen).ways, directed=False)
     found = [numbers[label == k] for k in range(label.max(initial=-1) + 1)]
@@ -55,10 +55,10 @@ def pieces(solid: VoxelSolid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int6
 
 
 def find_stance(solid: VoxelSolid, label: str) -> Stance:
-    """The first axis along which two legs carry one trunk.
+    """The stance along the first candidate up axis with two legs under one trunk.
 
     Raises:
-        InputError: There is none.
+        InputError: No axis has them.
     """
     for axis, sign in _UPS:
         up = np.zeros(3)

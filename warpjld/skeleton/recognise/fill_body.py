@@ -1,4 +1,4 @@
-"""Parts of bodies that names leave out, where the limbs leave no doubt: pelvis, spine, feet, and ends of bones."""
+"""Body joints that names leave out, inferred from recognised limbs: pelvis, spine, feet, and ends of bones."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["fill_body"]
 
-_TOES = 3  # chains below an ankle from which they are toes
+_TOES = 3  # smallest number of chains below an ankle that are taken for toes
 
 
 def fill_body(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str] = ()) -> None:
-    """Add to ``roles`` what lies between and beyond limbs; joints ``stated`` stay as they are."""
+    """Add joints between and beyond limbs to ``roles``; joints ``stated`` are kept."""
     if tree.flat or not roles.body:
         return
     _pelvis(tree, roles, stated)
@@ -30,7 +30,7 @@ def fill_body(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collect
 
 
 def _pelvis(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
-    """Where the legs part, if no name says it."""
+    """Set the pelvis to the lowest common ancestor of the legs, if no joint is named so."""
     hips = [roles.body[f"{side}.hip"] for side in ("left", "right") if f"{side}.hip" in roles.body]
     if "pelvis" in roles.body or "pelvis" in stated or len(hips) < 2:
         return
@@ -46,14 +46,15 @@ def _pelvis(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
 
 
 def _head(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
-    """The last joint of spine or neck beyond where the arms part, if no name says it; those before are the neck."""
+    """Set the head to the last joint of spine or neck beyond the arms, if no joint is named so; the neck to those
+    between."""
     arms = [roles.body[f"{side}.shoulder"] for side in ("left", "right") if f"{side}.shoulder" in roles.body]
     if roles.how != "names" or "head" in roles.body or stated or len(arms) < 2:
         return
     both = set(tree.ancestors(arms[1]))
     chest = next((j for j in tree.ancestors(arms[0]) if j in both), None)
     beyond = [j for j in _trunk(tree, roles) if chest in tree.ancestors(j)]
-    if len(beyond) == 1 and _word(roles, beyond[0]) == "neck":  # what alone goes on from a neck is the head
+    if len(beyond) == 1 and _word(roles, beyond[0]) == "neck":  # a neck's only descendant with skin is the head
         above = [c for c in tree.children[beyond[-1]] if flesh.live[c] and not flesh.bare[c]]
         beyond += [c for c in above if len(above) == 1 and c not in roles.body.values()]
     if not beyond or any(b not in tree.ancestors(a) for b, a in pairwise(beyond)) or flesh.bare[beyond[-1]]:
@@ -75,7 +76,7 @@ def _word(roles: Roles, joint: int) -> str:
 
 
 def _renumber(roles: Roles, word: str, joints: list[int]) -> None:
-    """Give a part's joints their numbers anew; other names of these, and other joints of this part, go."""
+    """Number a part's joints from 1; other names of these, and other joints of the part, are removed."""
     gone = [name for name, j in roles.body.items() if j in joints or name.rstrip("0123456789") == word]
     for name in gone:
         del roles.body[name]
@@ -83,7 +84,7 @@ def _renumber(roles: Roles, word: str, joints: list[int]) -> None:
 
 
 def _trunk_between(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
-    """The spine's joints, from pelvis to where the arms part, if no name says them."""
+    """Set the spine to the joints from the pelvis to the arms' common ancestor, if no joint is named so."""
     if any(name.startswith("spine") for name in (*roles.body, *stated)) or "pelvis" not in roles.body:
         return
     chest = _where_arms_part(tree, roles)
@@ -102,7 +103,7 @@ def _where_arms_part(tree: SourceTree, roles: Roles) -> int | None:
 
 
 def _feet(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
-    """The only joint below an ankle, or its toes, if no name says them."""
+    """Set the ball to an ankle's only child, or toes to its children, if no joint is named so."""
     ankles = {side: roles.body[f"{side}.ankle"] for side in ("left", "right") if f"{side}.ankle" in roles.body}
     middle = tree.positions[list(ankles.values())].mean(axis=0) if ankles else np.zeros(3)
     for side, ankle in ankles.items():
@@ -119,7 +120,7 @@ def _feet(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[
 
 
 def _ends(roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
-    """Joints without flesh that end toes, head and handless arms."""
+    """Set the tips of toes, head and arms without hands to joints without skin beyond them."""
     taken = set(roles.body.values())
     for end, last in flesh.ends.items():
         name = next((name for name, j in roles.body.items() if j == last), None)

@@ -1,4 +1,4 @@
-"""Parts of hands that names leave out, where the tree's shape leaves no doubt: metacarpals, and all digits."""
+"""Hand joints that names leave out, inferred from the tree's shape: metacarpals and whole digits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["fill_hands"]
 
 
 def fill_hands(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str] = ()) -> None:
-    """Add to ``roles`` the digits that names leave out, and metacarpals with other names."""
+    """Add digits without understood names, and metacarpals with other names, to ``roles``."""
     if tree.flat:
         return
     if not any(name.partition(".")[2] in HAND_PARENTS for name in stated):
@@ -46,13 +46,13 @@ def _whole(hand: HandRoles) -> bool:
 
 
 def _elsewhere(hand: HandRoles, named: HandRoles, roles: Roles) -> bool:
-    """Whether a joint of a hand plays another part already."""
+    """Whether a joint of a hand has another role already."""
     others = {joint for other in roles.hands if other is not named for joint in other.joints.values()}
     return bool((set(hand.joints.values()) - {hand.joints["wrist"]}) & (others | set(roles.body.values())))
 
 
 def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRoles) -> None:
-    """Digits of a hand in whose words only some were understood ("Ringfinger" beside "Daumen")."""
+    """Take all digits by shape where names are only partly understood ("Ringfinger" beside "Daumen")."""
     understood = {name.partition(".")[0] for name in named.joints} - {"wrist"}
     moved = {
         digit
@@ -73,7 +73,7 @@ def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRole
 
 
 def _metacarpals(tree: SourceTree, roles: Roles, hand: HandRoles, flesh: JointFlesh, stated: Collection[str]) -> None:
-    """The joint between wrist and one finger's base that leads to nothing else."""
+    """Set a metacarpal to the joint between wrist and a finger's base that has no other child."""
     taken = set(hand.joints.values()) | set(roles.body.values())
     for digit in DIGITS:
         name, base = f"{digit}.carpometacarpal", hand.joints.get(f"{digit}.base")

@@ -1,4 +1,4 @@
-"""A file's skin weights, and what they say of joints that recognition made one."""
+"""A file's painted skin weights, and their use to choose among joints that recognition merged."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["Painted", "let_flesh_lead"]
 
-_NONE = 0.02  # share of the skin of joints that are one, below which a joint has none
+_NONE = 0.02  # share of the skin of all merged joints, up to which one of them owns no skin
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +35,10 @@ class Painted:
 
 
 def let_flesh_lead(layout: Layout, tree: SourceTree, painted: Painted) -> None:
-    """Let the joint that carries the flesh stand for those that recognition made one with it.
+    """Replace joints without skin by the joint with skin that was merged into them.
 
-    Files put roots above the hips: joints without skin, at the origin maybe, that no flesh turns with. Where such a
-    one was taken for a joint of the skeleton, the one below it that has the skin takes its place.
+    Files have roots above the hips: joints without skin, maybe at the origin, that do not move with the body. Where
+    such a one was recognised as a joint of the skeleton, its descendant that owns the skin takes its place.
     """
     amounts = painted.amounts(len(tree))
     for joint, source in enumerate(layout.sources):

@@ -1,4 +1,4 @@
-"""Suspicious joint placing (R14): a joint that is not where joints belong is what deforms badly."""
+"""Detection of misplaced joints (R14), which cause bad deformation."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["Finding", "check_placing", "in_trunk", "outside_surface"]
 
 _OFF_CENTRE = 0.5  # |a − b| / (a + b) of the flesh on both sides: at 0.5 one side is three times the other
-_NARROW = 1.6  # a section wider than this times its depth is judged by its depth alone (palms)
-_PAD = (0.4, 2.5)  # flesh beyond an extremity per half thickness there: 1 in the centre of a round end
-_SAMPLES = 5  # points of a segment that are looked at
-# trunk joints follow the spine, which lies at the back: off-centre is where they belong
+_NARROW = 1.6  # sections wider than this times their depth are judged by depth alone (palms)
+_PAD = (0.4, 2.5)  # range of flesh beyond an extremity per half thickness there: 1 in the centre of a round end
+_SAMPLES = 5  # samples of a segment
+# trunk joints follow the spine, which lies towards the back, so that they are off-centre by nature
 _DIGIT = (0.06, 0.66)
-"""Share of the flesh, from the back, at which joints of digits lie: their bones run under the back's skin, the pad lies
-below. Toes of others lie at .08, knuckles at .2 to .5."""
-_CROWN = 0.02  # of the height: about half a head's radius
-_SPINE_AT = 0.3  # of the trunk's depth from its back: where a joint of the spine is proposed
+"""Range of the place of a digit's joints, as a share of the flesh from the back: bones run close to the back's skin,
+the pad lies below. Existing rigs have toes at .08, knuckles at .2 to .5."""
+_CROWN = 0.02  # tolerance of the head's extremity, per height of the body: about half a head's radius
+_SPINE_AT = 0.3  # proposed place of a spine joint, per depth of the trunk from its back
 _SPINE = (0.07, 0.56)
-"""Likewise joints of the spine in the trunk: of others .15 to .46."""
+"""Range of the place of spine joints, per depth of the trunk from its back: .15 to .46 in existing rigs."""
 
 _WORDS = {
     "proportion": "is misplaced along its limb",
@@ -46,15 +46,15 @@ _TRUNK = ("pelvis", "spine", "neck", "head", "clavicle", "shoulder", "hip", "top
 
 @dataclass(frozen=True)
 class Finding:
-    """One doubtful placing.
+    """A suspicious joint position.
 
     Attributes:
         joint: The joint, or the far end of the segment.
         kind: ``outside``, ``off-centre``, ``coincident``, ``leaves``, ``extremity``, ``proportion``, ``asymmetric`` or
             ``midline``.
-        amount: How far: a distance [m] for ``coincident``, else a ratio.
-        detail: What was measured, for people; may be empty.
-        proposal: Displacement that puts it where it is expected [mm], or None where nothing tells.
+        amount: Size of the deviation: a distance [m] for ``coincident``, else a ratio.
+        detail: Description of the measurement for the user; may be empty.
+        proposal: Displacement to the expected position [mm], or None if that is unknown.
     """
 
     joint: str
@@ -65,7 +65,7 @@ class Finding:
 
     @property
     def message(self) -> str:
-        """One line for people."""
+        """One line for the user."""
         said = f"{self.joint} {_WORDS[self.kind]}" + (f": {self.detail}" if self.detail else "")
         if self.proposal is None:
             return said
@@ -97,7 +97,7 @@ def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
 
 
 def _one_a_joint(findings: list[Finding]) -> list[Finding]:
-    """Of what is found at one joint, the first that says where it belongs, at the place of the first of all."""
+    """One finding per joint: the first, completed by the first proposal found for that joint."""
     best: dict[str, Finding] = {}
     for one in findings:
         had = best.get(one.joint)
@@ -110,7 +110,8 @@ def _one_a_joint(findings: list[Finding]) -> list[Finding]:
 
 
 def _way_back(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> NDArray[np.float64]:
-    """From outside the surface back into it: in the spine between its neighbours, else past the nearest skin."""
+    """Displacement of a joint from outside into the surface: a spine joint to between its neighbours, others past the
+    nearest vertex."""
     place = skeleton.rest[joint]
     above, below = int(skeleton.parents[joint]), skeleton.children[joint]
     if skeleton.names[joint].startswith(("spine", "neck")) and above >= 0 and below:
@@ -125,7 +126,7 @@ def _way_back(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> 
 
 
 def _crown(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
-    """The head's extremity away from the centre of the head's round top."""
+    """Check the head's extremity against the centre of the head's rounded top."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     up, _ = body_frame(joints)
     if up is None or "head.top" not in joints:
@@ -153,7 +154,7 @@ def _millimetres(offset: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 def _expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
-    """Joints that like joints of the same body put elsewhere."""
+    """Joints that deviate from comparable joints of the same body."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     found = finger_expectations(joints)
     up, _ = body_frame(joints)
@@ -177,9 +178,9 @@ def _expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[
 def body_frame(
     joints: Mapping[str, NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
-    """Up and forward of an upright body, each along the axis it is nearest to; None where its joints do not tell.
+    """Up and forward of an upright body, each snapped to the nearest coordinate axis; None where joints are missing.
 
-    The axes, not the joints: one of these may be the misplaced one.
+    Snapped, because one of the joints may be the misplaced one.
     """
     if not {"pelvis", "head", "left.hip", "right.hip"} <= set(joints):
         return None, None
@@ -225,7 +226,7 @@ def _coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Findi
 
 
 def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> list[tuple[NDArray[np.float64], float]]:
-    """Centre and radius of every hole's rim: wrists may be cut open there."""
+    """Centre and radius of every boundary loop: wrists may be cut open there."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     rim = unique[count == 1]
@@ -243,7 +244,7 @@ def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> lis
 def outside_surface(
     vertices: NDArray[np.float64], faces: NDArray[np.integer], points: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Which points lie outside a surface that may be open at its ends, shape (n,)."""
+    """Mask of points outside a surface that may be open at its ends, shape (n,)."""
     return ~_inside(vertices, faces, points, _open_ends(vertices, faces))
 
 
@@ -253,7 +254,7 @@ def _inside(
     points: NDArray[np.float64],
     ends: list[tuple[NDArray[np.float64], float]],
 ) -> NDArray[np.bool_]:
-    """Inside the surface, or in the mouth of an open end, where a winding number fades to one half."""
+    """Whether points are inside the surface, or near an open end, where the winding number fades to one half."""
     if not len(points):
         return np.zeros(0, dtype=bool)
     inside = winding_numbers(vertices, faces, points) > 0.5
@@ -287,7 +288,7 @@ def _leaving(
 def _sections(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], inside: NDArray[np.bool_]
 ) -> list[Finding]:
-    """Flesh on the four sides of every joint, and beyond every extremity."""
+    """Check the flesh on the four sides of every joint, and beyond every extremity."""
     joints = [j for j in np.flatnonzero(inside) if not in_trunk(skeleton.names[j])]
     if not joints:
         return []
@@ -327,7 +328,7 @@ def _in_digit(name: str) -> bool:
 
 
 def _digit(name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back: float, front: float) -> list[Finding]:
-    """A digit's joint too near to its back or its pad; at its base, where neighbours are grown together, likewise."""
+    """Check whether a digit's joint is too near to the digit's back or pad."""
     whole = back + front
     if not np.isfinite(whole) or name.endswith(("carpometacarpal", "thumb.base")):
         return []
@@ -339,5 +340,5 @@ def _digit(name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back
 
 
 def in_trunk(name: str) -> bool:
-    """Whether a joint of this canonical name is the trunk's, hips and shoulders among them."""
+    """Whether a joint of this canonical name belongs to the trunk, including hips and shoulders."""
     return name.rpartition(".")[2].rstrip("0123456789") in _TRUNK
