@@ -1,4 +1,4 @@
-"""Prescribed displacements, the partition they make, and bodies they leave free (B eqs. 6–8, R107, R110, R128)."""
+"""Dirichlet conditions, the partition they define, and free rigid motions (B eqs. 6–8, R107, R110, R128)."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ _MOTIONS = (
 
 
 class FreeBodyError(InputError):
-    """A body can move without deforming: a static solve would be singular."""
+    """A body can move without deforming: a static problem would be singular."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """Displacements U_k that are known, degree of freedom by degree of freedom: one, two or three of a node.
+    """Known displacements U_k by degree of freedom: one, two or three per node.
 
     Attributes:
         degrees: Degrees of freedom, 3 × node + axis, ascending, shape (n,).

@@ -96,7 +96,7 @@ def solid_of(
     if within is not None:
         places = origin + (seeds + 0.5) * size
         away, _ = cKDTree(within.points).query(places)
-        # the inside reaches the box's sides, too, where the surface extends beyond it: the coarser solid covers it there
+        # where the surface extends beyond the box, its inside reaches the sides, too: the coarser solid covers it there
         far = np.bincount(label[tuple(seeds.T)], weights=away > 2.5 * within.size)
         reached = reached[far[reached] > 0.5 * np.bincount(label[tuple(seeds.T)])[reached]]
     outside = np.isin(label, reached) & ~wall
