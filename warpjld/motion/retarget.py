@@ -40,7 +40,7 @@ __all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _GROUND_PERCENTILE = 10.0
-"""Percentile, over a clip, of the lowest joint's height that counts as the floor: a minimum would follow tracking noise."""
+"""Percentile over a clip of the lowest joint's height that counts as the floor; a minimum would follow tracking noise."""
 
 _FLAT = 0.3
 """Sine of the angle between foot and shin below which the foot's heading is undetermined at rest."""
@@ -173,7 +173,7 @@ def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
 
 
 def _body_frame(marks: Landmarks) -> NDArray[np.float64] | None:
-    """Columns left, up, forward; up is along the trunk, since thighs may be bent at rest, or else against the thighs."""
+    """Columns left, up, forward; up along the trunk, since thighs may be bent at rest, or else against the thighs."""
     thighs, trunk = marks.segment("hip", "knee", marks.rest), marks.trunk(marks.rest)
     across = next((a for part in ("hip", "shoulder") if (a := marks.across(part, marks.rest)) is not None), None)
     along = trunk if thighs is None or (trunk is not None and trunk.any()) else -thighs.sum(axis=0)
