@@ -40,7 +40,7 @@ __all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _GROUND_PERCENTILE = 10.0
-"""Percentile over a clip of the lowest joint's height that counts as the floor; a minimum would follow tracking noise."""
+"""Percentile over a clip of the lowest joint's height that counts as the floor; a minimum would follow the noise."""
 
 _FLAT = 0.3
 """Sine of the angle between foot and shin below which the foot's heading is undetermined at rest."""

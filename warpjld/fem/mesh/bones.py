@@ -212,7 +212,7 @@ class _Hull:
         corners = nodes[self.quads]
         if not len(corners):
             return 1.0
-    # the section's area and the angle around the axis, both as integrals over the lateral surface
+        # the section's area and the angle around the axis, both as integrals over the lateral surface
         area = turn = 0.0
         for u, v in ((a, b) for a in _GAUSS for b in _GAUSS):
             shape = np.array([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v])

@@ -40,7 +40,7 @@ def chebyshev_steps(degree: int, low: float, high: float) -> list[tuple[float, f
     """Momentum and scale of each step of the Chebyshev polynomial over [low, high].
 
     With step ← momentum · step + scale · (b − A x) and x ← x + step, from x = 0, the error component of eigenvalue λ is
-    multiplied by T(c(λ)) / T(c(0)), T the Chebyshev polynomial of that degree and c(λ) = (low + high − 2λ)/(high − low).
+    multiplied by T(c(λ)) / T(c(0)), T the Chebyshev polynomial of this degree, c(λ) = (low + high − 2λ)/(high − low).
     """
     centre, half = 0.5 * (high + low), 0.5 * (high - low)
     sigma = centre / half
