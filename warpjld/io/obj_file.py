@@ -111,7 +111,7 @@ def _split(text: str, path: Path) -> _Lines:
                 out.vertices.append(words[1:4])
                 out.vertex_lines.append(first)
             case "vt":
-                out.textures.append([*words[1:3], "0"][:2])  # of a curve's texture there is only u
+                out.textures.append([*words[1:3], "0"][:2])  # a texture for curves may have u only
                 out.texture_lines.append(first)
             case "f" | "fo":
                 _add_face(out, words[1:], first, path)
@@ -122,7 +122,7 @@ def _split(text: str, path: Path) -> _Lines:
 
 def _add_face(out: _Lines, words: list[str], line: int, path: Path) -> None:
     for corner in words:
-        word = corner[:40]  # as much as a message may show
+        word = corner[:40]  # limits the length of messages
         vertex, _, rest = word.partition("/")
         texture = rest.partition("/")[0]
         try:
@@ -140,7 +140,7 @@ def _add_face(out: _Lines, words: list[str], line: int, path: Path) -> None:
 
 
 def _counted(index: int, count: int) -> int:
-    """An index from zero: those of the file count from one, or backwards from the last of ``count`` so far."""
+    """A zero-based index: the file's count from one, or backwards from the last of ``count`` so far."""
     return index - 1 if index > 0 else count + index if index < 0 else -1
 
 
@@ -185,7 +185,7 @@ def _corner_uv(lines: _Lines, triangles: NDArray[np.int64], path: Path, notes: l
 def _parts(
     objects: list[tuple[str, int]], count: int, faces: NDArray[np.int64], polygon: NDArray[np.int64]
 ) -> tuple[Part, ...]:
-    """One part an object; none where objects share vertices, or have theirs in another order."""
+    """One part per object; none if objects share vertices, or use them in another order."""
     names = ["", *(name for name, _ in objects)]
     bounds = [0, *(int(np.searchsorted(polygon, start)) for _, start in objects), len(faces)]
     filled = [i for i in range(len(names)) if bounds[i + 1] > bounds[i]]
@@ -194,7 +194,7 @@ def _parts(
     highs = [int(faces[run].max()) for run in runs]
     if any(high >= low for high, low in zip(highs, lows[1:], strict=False)):
         return ()
-    ends = [0, *lows[1:], count]  # vertices that no face uses belong to the object before them
+    ends = [0, *lows[1:], count]  # unused vertices belong to the object before them
     return tuple(
         Part(names[i], slice(ends[k], ends[k + 1]), run) for k, (i, run) in enumerate(zip(filled, runs, strict=True))
     )

@@ -1,4 +1,4 @@
-"""Warp without its remarks, for programs whose output belongs to what they print."""
+"""Initialisation of Warp without its messages, for command-line programs."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ __all__ = ["silence_warp"]
 
 
 def silence_warp() -> None:
-    """Start Warp without its greeting on stdout, which belongs to what the command prints, and without its native
-    library's remark on stderr that there is no GPU: whoever asks for one is told by an error."""
+    """Initialise Warp without its greeting on stdout and its native library's message on stderr about a missing GPU; if
+    a GPU is requested, an error reports that."""
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
@@ -21,7 +21,7 @@ def silence_warp() -> None:
         sys.stderr.flush()
     try:
         kept = os.dup(2)
-    except OSError:  # closed: nothing can be heard there
+    except OSError:  # stderr is closed
         warp.init()
         return
     with open(os.devnull, "w") as nowhere:
@@ -36,7 +36,7 @@ def silence_warp() -> None:
 
 
 def _initialised() -> str | None:
-    """Start Warp; where its kernel cache cannot be written, with one of this process alone, which is told."""
+    """Initialise Warp, with a temporary kernel cache if the usual one is not writable; returns a warning then."""
     import warp
 
     problem = ""
@@ -50,7 +50,7 @@ def _initialised() -> str | None:
         problem = f"{error.filename or 'the cache'}: {error.strerror or error}"
     folder = tempfile.mkdtemp(prefix="warpjld-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    os.environ["WARP_CACHE_PATH"] = folder  # for the processes that this one starts
+    os.environ["WARP_CACHE_PATH"] = folder  # for child processes
     warp.config.kernel_cache_dir = folder
     warp.init()
     return f"kernels cannot be kept ({problem}): they are compiled anew; WARP_CACHE_PATH names another folder"

@@ -1,4 +1,4 @@
-"""USD as text. OpenUSD would hold all samples to print them, so the samples are streamed in between its text."""
+"""Writer of text USD caches, which streams samples into OpenUSD's text instead of holding all of them in memory."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from warpjld.io.caches.usd import UsdCache, build_stage, extent_of
 
 __all__ = ["UsdTextCache"]
 
-# stands for the samples in the text printed from the stage
+# placeholder of the samples in the text exported from the stage
 _MARK = "0: [(0.125, 0.25, 0.5)],"
 
 
 class UsdTextCache(Cache):
-    """The same content as `UsdCache`, readable by people; several times larger."""
+    """The same content as `UsdCache` as readable text; several times larger."""
 
     note = UsdCache.note
 
@@ -28,10 +28,10 @@ class UsdTextCache(Cache):
 
     @classmethod
     def check(cls) -> None:
-        """Make sure that OpenUSD is installed.
+        """Check that OpenUSD is installed.
 
         Raises:
-            MissingExtraError: It is not.
+            MissingExtraError: It is not installed.
         """
         UsdCache.check()
 
