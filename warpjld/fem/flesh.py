@@ -128,7 +128,7 @@ def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float,
         if parent < 0:
             # the piece behind the root (the stump of the forearm) is held with it
             parent, start = joint, skeleton.rest[joint]
-            along = _backwards(rig, envelope, joint)
+            along = _behind_root(rig, envelope, joint)
         else:
             start = skeleton.rest[parent]
             along = skeleton.rest[joint] - start
@@ -145,7 +145,7 @@ def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float,
     return shafts
 
 
-def _backwards(rig: Rig, envelope: Envelope, root: int) -> Array:
+def _behind_root(rig: Rig, envelope: Envelope, root: int) -> Array:
     """Vector from a root joint away from its children, to the end of the surface [m]."""
     skeleton = rig.skeleton
     children = skeleton.rest[np.asarray(skeleton.parents) == root] - skeleton.rest[root]
@@ -170,16 +170,16 @@ def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: Ints32, *, jointed: 
     bare: list[int] = []
     for _ in range(2):
         owner = claimed(mesh, list(shafts.values()), bare)
-        owner = _apart(mesh, np.where(owner >= 0, ends[owner], -1))
+        owner = _separate_bones(mesh, np.where(owner >= 0, ends[owner], -1))
         if jointed:
-            owner = _jointed(mesh, owner, parents)
+            owner = _separate_at_joints(mesh, owner, parents)
         bare = np.flatnonzero(~np.isin(ends, owner)).tolist()
         if not bare:
             break
     return owner
 
 
-def _jointed(mesh: HexMesh, owner: Ints, parents: Ints32) -> Ints:
+def _separate_at_joints(mesh: HexMesh, owner: Ints, parents: Ints32) -> Ints:
     """Keep at least two elements of flesh between bones at a joint: one would have to bear the whole motion."""
     owner = owner.copy()
     for joint, parent in enumerate(parents):
@@ -197,7 +197,7 @@ def _jointed(mesh: HexMesh, owner: Ints, parents: Ints32) -> Ints:
     return owner
 
 
-def _apart(mesh: HexMesh, owner: Ints) -> Ints:
+def _separate_bones(mesh: HexMesh, owner: Ints) -> Ints:
     """Assign each node to one bone at most: where bones touch, elements of the one with the larger index become
     flesh."""
     owner = owner.copy()

@@ -79,7 +79,7 @@ def hand_points(skeleton: Skeleton) -> ActorSkeleton:
     )
 
 
-_BEHIND = 0.06  # depth of nose and chin inside the skin, per height from skull base to crown; about 1 cm
+_SKIN_DEPTH = 0.06  # depth of nose and chin inside the skin, per height from skull base to crown; about 1 cm
 _NUMBERED = tuple(own for name, own in CANONICAL.items() if name.startswith("vertebra"))
 
 Joints = dict[str, NDArray[np.float64]]
@@ -137,7 +137,7 @@ def _face(
 ) -> Placed:
     """Nose and chin inside the flesh, slightly behind their foremost surface points."""
     for name, point in face_points(joints, vertices, up, forward):
-        yield name, point - _BEHIND * float((joints["head.top"] - joints["head"]) @ up) * forward
+        yield name, point - _SKIN_DEPTH * float((joints["head.top"] - joints["head"]) @ up) * forward
 
 
 def face_points(

@@ -10,7 +10,7 @@ from collections.abc import Collection
 
 from warpjld.skeleton.hand import HAND_PARENTS, hand_joint_names
 
-__all__ = ["ACTOR_PARENTS", "ACTOR_POINTS", "CANONICAL", "CARRIES_NOTHING", "POINT_JOINTS", "point_set"]
+__all__ = ["ACTOR_PARENTS", "ACTOR_POINTS", "CANONICAL", "NO_ARTICULATION", "POINT_JOINTS", "point_set"]
 
 _SIDES = ("left", "right")
 
@@ -93,7 +93,7 @@ ACTOR_PARENTS: dict[str, str | None] = {
 }
 """Point → parent point; None for the root."""
 
-_OTHERWISE = {
+_CANONICAL_NAMES = {
     "vertebra1": "spine1",
     "vertebra2": "spine2",
     "vertebra3": "spine3",
@@ -110,7 +110,7 @@ _OTHERWISE = {
 
 def _canonical(name: str) -> str:
     side, dot, short = name.partition(".")
-    return f"{side}.{_OTHERWISE.get(short, short)}" if dot else _OTHERWISE.get(name, name)
+    return f"{side}.{_CANONICAL_NAMES.get(short, short)}" if dot else _CANONICAL_NAMES.get(name, name)
 
 
 CANONICAL: dict[str, str] = {name: _canonical(name) for name in ACTOR_POINTS}
@@ -122,7 +122,7 @@ POINT_JOINTS: tuple[str, ...] = tuple(
 )
 """Canonical joints that exist only in an actor skeleton; no joint naming convention has them."""
 
-CARRIES_NOTHING: tuple[str, ...] = _LEAVES
+NO_ARTICULATION: tuple[str, ...] = _LEAVES
 """Points, without their side, that are no articulation."""
 
 

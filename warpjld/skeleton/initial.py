@@ -21,9 +21,9 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["bent_as_before", "bent_limbs", "check_initial", "with_initial"]
 
 _HINGES = {"elbow": ("shoulder", "wrist"), "knee": ("hip", "ankle")}
-_PLAIN = np.radians(1.0)
+_NEGLIGIBLE = np.radians(1.0)
 """Smaller angles are within the accuracy of joint positions and count as straight."""
-_SLACK = 1e-6  # rad: limits in files are in degrees
+_ROUNDING = 1e-6  # rad: limits in files are in degrees
 
 
 def with_initial(skeleton: Skeleton, given: Mapping[int, Mapping[str, float]]) -> tuple[Skeleton, tuple[str, ...]]:
@@ -68,7 +68,7 @@ def bent_limbs(skeleton: Skeleton) -> dict[int, float]:
         axis = skeleton.axes[joint]
         before, after = (unit(v - axis * (axis @ v)) for v in (before, after))
         angle = float(np.arctan2(np.cross(before, after) @ axis, before @ after))
-        if angle > _PLAIN:
+        if angle > _NEGLIGIBLE:
             out[joint] = angle
     return out
 
@@ -99,4 +99,4 @@ def check_initial(skeleton: Skeleton) -> None:
 
 
 def _within(angle: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray((angle >= low - _SLACK) & (angle <= high + _SLACK))
+    return np.asarray((angle >= low - _ROUNDING) & (angle <= high + _ROUNDING))

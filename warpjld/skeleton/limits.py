@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.skeleton.actor_points import CARRIES_NOTHING
+from warpjld.skeleton.actor_points import NO_ARTICULATION
 
 __all__ = ["default_limits"]
 
@@ -25,7 +25,7 @@ _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "tip": (_CLOSED,) * 4,  # an extremity has no bone
     "index.carpometacarpal": (_CLOSED,) * 4,
     "middle.carpometacarpal": (_CLOSED,) * 4,
-    **dict.fromkeys(CARRIES_NOTHING, (_CLOSED,) * 4),
+    **dict.fromkeys(NO_ARTICULATION, (_CLOSED,) * 4),
     "forearm_twist": (_CLOSED, _CLOSED, (-80, 80), _CLOSED),
     "elbow": ((0, 150), _CLOSED, (-80, 80), _CLOSED),
     "shoulder": ((-60, 180), (0, 180), (-90, 70), (-60, 180)),

@@ -27,19 +27,19 @@ Depths = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64
 """Penetration depths of samples along an arm in the body, at least 0: joints (B, K, 3) [m] and rotations (B, K, 4) →
 depths (B, samples) [m]."""
 
-_SPREAD = 512
+_SAMPLES = 512
 """Postures sampled as candidates for starts."""
 _STARTS = 5
 """Best samples from which the search is started."""
 _STEP = 1e-6  # of central differences [rad]
-_NEAR = (20.0, 1000.0)
+_DISTANCE_WEIGHTS = (20.0, 1000.0)
 """Weights of the distance to the target over the arm's length, of the first and the last solve: the first settles the
 comfort terms, the last meets the target; comfort moves it by less than 1e-5 of the arm's length."""
-_LOOK = 2.0
+_PREFERRED = 2.0
 """Weight of preferred directions (such as that of the palm), over the sine of their deviation; prescribed ones weigh as
 positions do."""
-_EXACT = 5.0  # weight of prescribed directions in the first solve; scaled as that of the distance in the last
-_DEEP = 50.0  # weight of penetration depths, over the arm's length
+_PRESCRIBED = 5.0  # weight of prescribed directions in the first solve; scaled as that of the distance in the last
+_PENETRATION = 50.0  # weight of penetration depths, over the arm's length
 # weights of discomfort, over half of the clinical range of motion
 _DISCOMFORT = {
     ("wrist", "flexion"): 0.5 / np.radians(75.0),
@@ -53,8 +53,8 @@ _DISCOMFORT = {
 _SWING = 0.2 / np.radians(90.0)
 """Weight of the shoulder's swing from the present pose: of two ways to turn it the shorter one is taken."""
 _SWINGING = (("shoulder", "flexion"), ("shoulder", "abduction"))
-_HANG = 0.4  # weight of the upper arm's deviation from hanging
-_OUT = np.radians(15.0)  # between a hanging upper arm and the vertical of the trunk
+_HANGING = 0.4  # weight of the upper arm's deviation from hanging
+_HANGING_ANGLE = np.radians(15.0)  # between a hanging upper arm and the vertical of the trunk
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,18 +104,18 @@ def reach(
     """
     from scipy.optimize import least_squares
 
-    costs = _Costs(arm, angles, body, target, depths)
+    costs = _Residuals(arm, angles, body, target, depths)
     low, high = arm.limits.T
     best: NDArray[np.float64] | None = None
     least = np.inf
     for start in costs.starts():
         # strictly inside the bounds, as least_squares requires
         found = np.clip(start, low + 1e-9, high - 1e-9)
-        for near in _NEAR:
+        for near in _DISTANCE_WEIGHTS:
             solved = least_squares(
                 lambda x, near=near: costs(x[None], near)[0],
                 found,
-                jac=lambda x, near=near: _slopes(lambda some: costs(some, near), x),
+                jac=lambda x, near=near: _jacobian(lambda postures: costs(postures, near), x),
                 bounds=(low, high),
                 xtol=1e-10,
                 ftol=1e-10,
@@ -145,18 +145,18 @@ def clear(
 
     low, high = arm.limits.T
 
-    def costs(some: NDArray[np.float64]) -> NDArray[np.float64]:
-        positions, rotations = arm.chains(angles, some, body)
-        return np.concatenate([some - values, _DEEP * depths(positions, rotations) / arm.length], axis=1)
+    def costs(postures: NDArray[np.float64]) -> NDArray[np.float64]:
+        positions, rotations = arm.chains(angles, postures, body)
+        return np.concatenate([postures - values, _PENETRATION * depths(positions, rotations) / arm.length], axis=1)
 
     start = np.clip(values, low + 1e-9, high - 1e-9)
     solved = least_squares(
-        lambda x: costs(x[None])[0], start, jac=lambda x: _slopes(costs, x), bounds=(low, high), max_nfev=100
+        lambda x: costs(x[None])[0], start, jac=lambda x: _jacobian(costs, x), bounds=(low, high), max_nfev=100
     )
     return np.asarray(solved.x)
 
 
-class _Costs:
+class _Residuals:
     """Residuals of postures; arguments as of ``reach``."""
 
     def __init__(
@@ -176,12 +176,12 @@ class _Costs:
         positions, rotations = arm.chains(self._angles, values, self._body)
         away = positions[:, -1] + rotate(rotations[:, -1], target.point) - target.place
         upper = unit(positions[:, arm.elbow] - positions[:, arm.shoulder])
-        out = [near * away / arm.length, _HANG * (upper - self._hang), self._weights * values]
+        out = [near * away / arm.length, _HANGING * (upper - self._hang), self._weights * values]
         out.append(self._swing * (values - self._now))
-        weight = near / _NEAR[0] * _EXACT if target.exact else _LOOK
+        weight = near / _DISTANCE_WEIGHTS[0] * _PRESCRIBED if target.exact else _PREFERRED
         out += [weight * (rotate(rotations[:, -1], own) - wanted) for own, wanted in target.aims]
         if self._depths is not None:
-            out.append(_DEEP * self._depths(positions, rotations) / arm.length)
+            out.append(_PENETRATION * self._depths(positions, rotations) / arm.length)
         return np.concatenate(out, axis=1)
 
     def starts(self) -> NDArray[np.float64]:
@@ -189,8 +189,8 @@ class _Costs:
         from scipy.stats import qmc
 
         low, high = self._arm.limits.T
-        spread = low + qmc.Sobol(len(low), scramble=False).random(_SPREAD) * (high - low)
-        order = np.argsort((self(spread, _NEAR[0]) ** 2).sum(axis=1), kind="stable")
+        spread = low + qmc.Sobol(len(low), scramble=False).random(_SAMPLES) * (high - low)
+        order = np.argsort((self(spread, _DISTANCE_WEIGHTS[0]) ** 2).sum(axis=1), kind="stable")
         return np.asarray(spread[order[:_STARTS]])
 
     def reached(self, x: NDArray[np.float64]) -> Reached:
@@ -203,7 +203,7 @@ class _Costs:
         return Reached(self._arm.posed(self._angles, x), float(np.linalg.norm(away)), off)
 
 
-def _slopes(
+def _jacobian(
     residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]], x: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Jacobian (R, n) of residuals (B, n) → (B, R), by central differences evaluated in one batch."""
@@ -225,5 +225,5 @@ def _hanging(arm: Arm, body: Poses) -> NDArray[np.float64]:
     middle = rest[skeleton.names.index(other)] if other in skeleton.names else rest[arm.base]
     out = rest[arm.joints[arm.shoulder]] - middle
     out = unit(out - up * (out @ up))
-    hanging = np.sin(_OUT) * out - np.cos(_OUT) * up
+    hanging = np.sin(_HANGING_ANGLE) * out - np.cos(_HANGING_ANGLE) * up
     return np.asarray(rotate(body.rotations[0, arm.base], hanging))

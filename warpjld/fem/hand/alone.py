@@ -115,7 +115,7 @@ class FleshAlone:
             return self._known[nearest]
         if contact.any():
             pushed = norm(contact.reshape(-1))
-            found = self._from(self._known[nearest], poses, bones, pushed, loads or Loads(), _HALVINGS)
+            found = self._in_steps(self._known[nearest], poses, bones, pushed, loads or Loads(), _HALVINGS)
         else:
             found = Untouched(poses, displacement, reactions)
         if found is not None:
@@ -124,7 +124,7 @@ class FleshAlone:
             self._known.append(found)
         return found
 
-    def _from(
+    def _in_steps(
         self,
         before: Untouched,
         poses: Poses,
@@ -137,16 +137,16 @@ class FleshAlone:
         found = self._newton(before, poses, bones, pushed, loads)
         if found is None and halvings > 0:
             between = halfway(self._hand, before.poses, poses)
-            half = self._from(before, between, self._bones(between), pushed, loads, halvings - 1)
+            half = self._in_steps(before, between, self._prescribed_values(between), pushed, loads, halvings - 1)
             if half is not None:
-                found = self._from(half, poses, bones, pushed, loads, halvings - 1)
+                found = self._in_steps(half, poses, bones, pushed, loads, halvings - 1)
         return found
 
     def _moves(self, poses: Poses) -> Moves:
         """Rigid motions of the bones from rest."""
         return self._start.to(self._hand.moves(poses))
 
-    def _bones(self, poses: Poses) -> NDArray[np.float64]:
+    def _prescribed_values(self, poses: Poses) -> NDArray[np.float64]:
         """Prescribed displacements in a pose, shape (n,)."""
         nodes = self.degrees[::3] // 3
         x = self.body.mesh.nodes[nodes]

@@ -53,7 +53,7 @@ class Moves:
             weights: Weights of the bones at the points, rows summing to one, shape (n, B).
             points: [m], shape (n, 3).
         """
-        real = self.turns * _halves(self.turns, weights)[:, None]
+        real = self.turns * _hemisphere_signs(self.turns, weights)[:, None]
         vector, scalar = real[:, :3], real[:, 3:]
         dual = 0.5 * np.concatenate(
             [
@@ -87,7 +87,7 @@ def moves_of(poses: Poses, frame: int, parents: Sequence[int], rest: NDArray[np.
     return Moves(turn.as_quat(), poses.positions[frame, joints] - turn.apply(rest[joints]))
 
 
-def _halves(turns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def _hemisphere_signs(turns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sign of each bone's quaternion, shape (B,), such that bones that share points blend along the shorter arc.
 
     In a fist a fingertip is rotated by more than half a turn from rest, but from bone to bone by far less: signs are

@@ -54,7 +54,7 @@ def loads_from_reactions(
     Raises:
         InputError: Wrong shapes.
     """
-    return _handed_on(hand, displacement, -reactions)
+    return _distributed(hand, displacement, -reactions)
 
 
 def loads_from_contact(hand: FleshHand, displacement: NDArray[np.float64], nodal: NDArray[np.float64]) -> BoneLoads:
@@ -68,10 +68,10 @@ def loads_from_contact(hand: FleshHand, displacement: NDArray[np.float64], nodal
     Raises:
         InputError: Wrong shapes.
     """
-    return _handed_on(hand, displacement, nodal)
+    return _distributed(hand, displacement, nodal)
 
 
-def _handed_on(hand: FleshHand, displacement: NDArray[np.float64], forces: NDArray[np.float64]) -> BoneLoads:
+def _distributed(hand: FleshHand, displacement: NDArray[np.float64], forces: NDArray[np.float64]) -> BoneLoads:
     """Nodal forces distributed to the bones by the nodes' weights."""
     count = len(hand.mesh.nodes)
     for name, array in (("displacement", displacement), ("forces", forces)):

@@ -60,7 +60,7 @@ def cushions(hand: FleshHand) -> tuple[Cushion, ...]:
     middles = mesh.nodes[quads].mean(axis=1)
     mine = hand.weights[quads].sum(axis=1).argmax(axis=1)
     under = -Envelope(hand.surface.vertices, hand.surface.faces).ask(middles).distance
-    links = _links(mesh.elements, len(mesh.nodes))
+    links = _adjacency(mesh.elements, len(mesh.nodes))
     out = []
     for number, (shaft, near) in enumerate(zip(flesh.shafts, flesh.parents, strict=True)):
         name = hand.segments[number].split(".")
@@ -72,7 +72,7 @@ def cushions(hand: FleshHand) -> tuple[Cushion, ...]:
         facing = off @ palm > _PALMAR * size * np.linalg.norm(palm)
         over = facing & (mine == number) & (share > shaft.near) & (share < shaft.far)
         if over.any():
-            levels = _levels(links, hand.bone_nodes[number], quads[over])
+            levels = _edge_distances(links, hand.bone_nodes[number], quads[over])
             depth = float(np.median((size + under - radius)[over]))
             out.append(Cushion(hand.segments[number], int(np.median(levels)), depth, float(np.median(under[over]))))
     return tuple(out)
@@ -92,18 +92,20 @@ def coarse_note(found: Sequence[Cushion], spacing: float, digits: Sequence[str] 
     worst: dict[str, Cushion] = {}
     for one in sorted(thin, key=lambda one: one.size):
         worst.setdefault(one.segment.split(".")[-2], one)
-    told = ", ".join(f"{digit} (at most {1e3 * one.size:.1f} mm)" for digit, one in worst.items())
-    return f"elements of {1e3 * spacing:g} mm are too large for the flesh over the bones, forces may be far off: {told}"
+    listed = ", ".join(f"{digit} (at most {1e3 * one.size:.1f} mm)" for digit, one in worst.items())
+    return (
+        f"elements of {1e3 * spacing:g} mm are too large for the flesh over the bones, forces may be far off: {listed}"
+    )
 
 
-def _links(elements: NDArray[np.int32], count: int) -> Any:
+def _adjacency(elements: NDArray[np.int32], count: int) -> Any:
     """Adjacency matrix of ``count`` nodes by element edges, a symmetric ``csr_array``."""
     one, other = elements[:, EDGES].reshape(-1, 2).T
     links = csr_array((np.ones(len(one), np.float32), (one, other)), shape=(count, count))
     return csr_array(links + links.T)
 
 
-def _levels(links: Any, start: NDArray[np.integer], wanted: NDArray[np.integer]) -> NDArray[np.int64]:
+def _edge_distances(links: Any, start: NDArray[np.integer], wanted: NDArray[np.integer]) -> NDArray[np.int64]:
     """Number of edges from each wanted node to the nearest start node, in their shape; -1 if unconnected."""
     out = np.full(links.shape[0], -1)
     out[start] = 0

@@ -78,10 +78,10 @@ def skin_labels(
                 webs[kind] = len(names)
                 names.append(names[kind] + WEB)
             out[face] = webs[kind]
-    return _grouped(out, names)
+    return _reordered(out, names)
 
 
-def _grouped(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
+def _reordered(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
     """Labels and their names, reordered such that the palm's come first and a digit's are contiguous."""
     digits = list(dict.fromkeys(["", *map(_digit, names)]))
     order = sorted(range(len(names)), key=lambda k: digits.index(_digit(names[k])))

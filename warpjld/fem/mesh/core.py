@@ -40,7 +40,7 @@ def make_manifold(cells: Mask, spare: Mask | None = None) -> Mask:
     left = np.zeros_like(cells) if spare is None else spare & ~cells
     while True:
         around = np.stack([_shifted(cells, corner) for corner in np.ndindex(2, 2, 2)], axis=-1)
-        wrong = _BROKEN[around @ _BITS]
+        wrong = _NONMANIFOLD[around @ _BITS]
         if not wrong.any():
             return cells
         count = ndimage.convolve(
@@ -48,22 +48,22 @@ def make_manifold(cells: Mask, spare: Mask | None = None) -> Mask:
         )
         for i, j, k in np.argwhere(wrong):
             block = tuple(slice(n - 1, n + 1) for n in (i, j, k))
-            cells[block], left[block] = _mended(cells[block], left[block], count[block])
+            cells[block], left[block] = _repaired(cells[block], left[block], count[block])
 
 
-def _mended(present: Mask, spare: Mask, count: Ints) -> tuple[Mask, Mask]:
+def _repaired(present: Mask, spare: Mask, count: Ints) -> tuple[Mask, Mask]:
     """The 2 × 2 × 2 cells around a node, repaired at the lowest cost, and the remaining spare ones: cells with few
     neighbours are removed, or spare ones added."""
     price = np.where(present, 6.0 + count, np.where(spare, 8.0, np.inf)).ravel()
     pattern = present.ravel()
-    if not _BROKEN[int(pattern @ _BITS)]:
+    if not _NONMANIFOLD[int(pattern @ _BITS)]:
         return present, spare
-    best, mended = np.inf, present
+    best, repaired = np.inf, present
     for flips, number in zip(_FLIPS, _FLIPS @ _BITS, strict=True):
         cost = price[flips].sum()
-        if cost < best and not _BROKEN[int(pattern @ _BITS) ^ int(number)]:
-            best, mended = cost, (pattern ^ flips).reshape(2, 2, 2)
-    return mended, spare & ~mended & ~present
+        if cost < best and not _NONMANIFOLD[int(pattern @ _BITS) ^ int(number)]:
+            best, repaired = cost, (pattern ^ flips).reshape(2, 2, 2)
+    return repaired, spare & ~repaired & ~present
 
 
 def _shifted(cells: Mask, corner: tuple[int, int, int]) -> Mask:
@@ -74,7 +74,7 @@ def _shifted(cells: Mask, corner: tuple[int, int, int]) -> Mask:
     return out
 
 
-def _broken_patterns() -> Mask:
+def _nonmanifold_patterns() -> Mask:
     """Mask of the 256 patterns of cells around a node whose filled or empty cells are not connected."""
     table = np.zeros(256, dtype=bool)
     corners = list(np.ndindex(2, 2, 2))
@@ -87,7 +87,7 @@ def _broken_patterns() -> Mask:
     return table
 
 
-_BROKEN = _broken_patterns()
+_NONMANIFOLD = _nonmanifold_patterns()
 _BITS = 1 << np.arange(8)
 _FLIPS = np.array([[bool(n >> bit & 1) for bit in range(8)] for n in range(1, 256)])
 
@@ -122,13 +122,13 @@ def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask,
         raise InputError(f"spacing: {spacing:g} m would make a grid of {int(counts.prod()):,} nodes")
     lines = [low[k] + spacing * np.arange(counts[k]) for k in range(3)]
     grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
-    deep, inside = _sides(envelope, grid, _MARGIN * spacing)
-    room = _Room(envelope, grid, deep, inside, spacing)
+    deep, inside = _classify_nodes(envelope, grid, _MARGIN * spacing)
+    depths_of_cells = _CellDepths(envelope, grid, deep, inside, spacing)
     banned = np.zeros([n - 1 for n in counts], dtype=bool)
-    spare = room.middle > _PATH
-    cells = make_manifold(room.inside, spare)
+    spare = depths_of_cells.middle > _PATH
+    cells = make_manifold(depths_of_cells.inside, spare)
     for _ in range(_ROUNDS):
-        reached = room.reached(cells, banned)
+        reached = depths_of_cells.reached(cells, banned)
         kept = make_manifold(reached, spare & ~banned)
         banned |= reached & ~kept
         done = np.array_equal(kept, cells)
@@ -148,7 +148,7 @@ def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask,
     return cells, low
 
 
-class _Room:
+class _CellDepths:
     """The grid's cells and their depth inside the surface.
 
     Attributes:
@@ -160,7 +160,7 @@ class _Room:
         self.inside = core_cells(deep)
         some = ~core_cells(~inside)
         places = np.stack(np.nonzero(some), axis=1)
-        ask = _Halves(envelope, grid, spacing)
+        ask = _HalfGridDepths(envelope, grid, spacing)
         middle = ask.depth(2 * places + 1)
         # the surface may pass between corners that are all inside, as the gap between two fingers does, but not near a
         # centre that is deep enough
@@ -213,7 +213,7 @@ class _Room:
         return out | left
 
 
-class _Halves:
+class _HalfGridDepths:
     """Depths at a grid's nodes and half-way between them, by doubled indices; cached."""
 
     def __init__(self, envelope: Envelope, grid: Array, spacing: float) -> None:
@@ -235,7 +235,7 @@ class _Halves:
         return out
 
 
-def _sides(envelope: Envelope, grid: Array, margin: float) -> tuple[Mask, Mask]:
+def _classify_nodes(envelope: Envelope, grid: Array, margin: float) -> tuple[Mask, Mask]:
     """Masks of the nodes of a grid (ni, nj, nk, 3) that are deeper than a margin [m], and that are inside.
 
     The distance from a closed surface changes by no more than the distance of points: a node far from the surface

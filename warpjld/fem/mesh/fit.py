@@ -27,7 +27,7 @@ _CLOSE = 0.05
 """Largest distance of boundary nodes from the surface, in spacings, at which the final rounds end."""
 _NEARER = 0.9
 """Largest ratio of distances of successive final rounds that counts as progress."""
-_LED = 0.3
+_FOLLOWING = 0.3
 """Pull of nodes that follow their neighbours, per pull of others."""
 
 
@@ -74,8 +74,8 @@ def fit_mesh(envelope: Envelope, spacing: float, *, least: float = 0.1, name: st
             "more than two faces): holes were closed, inside and outside told apart by winding number"
         )
     cells, origin = core_of(envelope, spacing, notes)
-    mesh, boundary = _grown(cells, origin, spacing, name)
-    fitted, backed = _settled(mesh, boundary, envelope, spacing, least, rounds)
+    mesh, boundary = _with_boundary_layer(cells, origin, spacing, name)
+    fitted, backed = _fit_boundary(mesh, boundary, envelope, spacing, least, rounds)
     quality = fitted.scaled_jacobian()
     if quality.min() < least:
         raise InputError(
@@ -107,7 +107,7 @@ def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> Fit:
     return fit_mesh(Envelope(scale * np.asarray(loaded.vertices), np.asarray(loaded.faces)), spacing)
 
 
-def _grown(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMesh, Ints]:
+def _with_boundary_layer(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMesh, Ints]:
     """The core's cells with one layer of elements on each free face, and the nodes of the boundary."""
     shape = [n + 1 for n in cells.shape]
     every = elements_of(np.arange(int(np.prod(shape)), dtype=np.int32).reshape(shape))[cells.ravel()]
@@ -142,7 +142,7 @@ def _grown(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMe
     return mesh, len(nodes) + np.arange(len(skin))
 
 
-def _settled(
+def _fit_boundary(
     mesh: HexMesh, boundary: Ints, envelope: Envelope, spacing: float, least: float, rounds: int
 ) -> tuple[HexMesh, int]:
     """Move boundary nodes to the surface and keep elements well shaped, as far as both are possible.
@@ -153,7 +153,7 @@ def _settled(
     the mesh and the number of nodes off the surface.
     """
     quads = mesh.quads(mesh.face_set("surface"))
-    links = _links(quads, boundary)
+    links = _adjacency(quads, boundary)
     nodes = mesh.nodes
     relaxed = np.ones(len(boundary))
     best: tuple[HexMesh, int] | None = None
@@ -164,8 +164,8 @@ def _settled(
         outwards = np.zeros_like(nodes)
         np.add.at(outwards, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
         agrees = np.einsum("bi,bi->b", outwards[boundary], answer.normal) > 0.0
-        target, normal = _led(nodes[boundary], answer.closest, answer.normal, agrees, links)
-        strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * np.where(agrees, 1.0, _LED)
+        target, normal = _follow_neighbours(nodes[boundary], answer.closest, answer.normal, agrees, links)
+        strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * np.where(agrees, 1.0, _FOLLOWING)
         nodes = improve(
             nodes,
             mesh.elements,
@@ -179,7 +179,7 @@ def _settled(
         if number + 1 < rounds:
             continue
         moved = replace(mesh, nodes=nodes)
-        snapped = _snapped(moved, boundary, agrees & (relaxed > 0.01), envelope, least)
+        snapped = _projected(moved, boundary, agrees & (relaxed > 0.01), envelope, least)
         if snapped[0].scaled_jacobian().min() >= least:
             away = float(np.abs(envelope.ask(snapped[0].nodes[boundary]).distance).max())
             if best is None or away < _NEARER * nearest:
@@ -202,7 +202,7 @@ def _settled(
     return snapped if best is None else best
 
 
-def _links(quads: Ints32, boundary: Ints) -> Any:
+def _adjacency(quads: Ints32, boundary: Ints) -> Any:
     """Adjacency of boundary nodes by edges, a symmetric ``csr_array`` (B, B)."""
     row = np.searchsorted(boundary, quads)
     one, other = row.ravel(), np.roll(row, -1, axis=1).ravel()
@@ -210,7 +210,7 @@ def _links(quads: Ints32, boundary: Ints) -> Any:
     return table + table.T
 
 
-def _led(nodes: Array, closest: Array, normal: Array, agrees: Mask, links: Any) -> tuple[Array, Array]:
+def _follow_neighbours(nodes: Array, closest: Array, normal: Array, agrees: Mask, links: Any) -> tuple[Array, Array]:
     """Targets and normals; nodes with an invalid closest point take the mean displacement of their neighbours."""
     move = np.where(agrees[:, None], closest - nodes, 0.0)
     facing = np.where(agrees[:, None], normal, 0.0)
@@ -227,7 +227,7 @@ def _led(nodes: Array, closest: Array, normal: Array, agrees: Mask, links: Any) 
     return nodes + move, np.where(size > 1e-6, facing / np.maximum(size, 1e-6), normal)
 
 
-def _snapped(mesh: HexMesh, boundary: Ints, chosen: Mask, envelope: Envelope, least: float) -> tuple[HexMesh, int]:
+def _projected(mesh: HexMesh, boundary: Ints, chosen: Mask, envelope: Envelope, least: float) -> tuple[HexMesh, int]:
     """The mesh with boundary nodes projected on the surface, less far at elements that would become worse than
     ``least``; and the number of nodes that are not on it."""
     start = mesh.nodes

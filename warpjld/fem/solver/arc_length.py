@@ -76,13 +76,13 @@ def follow(
         if progress:
             progress(f"load {factor:.4g}: {instant.newton} Newton steps, residual {instant.residual:.1e}")
         if full:
-            text = "" if len(reached) < 2 else _turned([i.factor for i in reached])
+            text = "" if len(reached) < 2 else _limit_message([i.factor for i in reached])
             return Solution(SolveStatus.CONVERGED, tuple(reached[1:]), text or "converged", held, problem.loads)
     message = f"the path could not be followed to the full load: it got to {factor:.4g}, at most to {limit:.4g} of it"
     return Solution(SolveStatus.MAX_ITERATIONS, tuple(reached[1:] or reached), message, held, problem.loads)
 
 
-def _turned(factors: list[float]) -> str:
+def _limit_message(factors: list[float]) -> str:
     """Message on the largest limit load on the path; empty without one."""
     peaks = [b for a, b, c in zip(factors, factors[1:], factors[2:], strict=False) if a < b > c]
     return f"converged, beyond a limit load of {max(peaks):.4g} of the load" if peaks else ""

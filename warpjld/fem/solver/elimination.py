@@ -60,7 +60,7 @@ def eliminate(rows: Ints32, columns: Ints32, active: Mask) -> Elimination:
     full = csr_array((np.ones(len(columns)), columns, rows), shape=(len(active),) * 2)
     pattern = csr_array(full[nodes][:, nodes])
     place = np.full(len(active), -1, np.int32)
-    mine, lower = _ordered(pattern)
+    mine, lower = _minimum_degree(pattern)
     place[nodes] = mine
     order = np.empty(len(nodes), np.int32)
     order[mine] = nodes
@@ -86,7 +86,7 @@ def work_by_profile(rows: Ints32, columns: Ints32, active: Mask) -> float:
     return float(13.5 * (profile * profile).sum())
 
 
-def _ordered(pattern: Any) -> tuple[Ints32, Any]:
+def _minimum_degree(pattern: Any) -> tuple[Ints32, Any]:
     """Position of each node, and the pattern of the factor's lower triangle in that order, as ``csc_array``, obtained
     by factorising a Laplacian."""
     count = pattern.shape[0]
@@ -146,11 +146,11 @@ def _tables(order: Ints32, place: Ints32, first: Ints, lists: list[Ints32]) -> E
     for front in range(count):  # children come before their parents
         if parent[front] >= 0:
             below[parent[front]] += below[front]
-    parts = _parted(parent, below, work)
+    parts = _partition(parent, below, work)
     left, room, sizes = np.zeros(count, np.int64), 0, rest * 3 * (every - own)
-    parts = [_sequence(part, parent, sizes) for part in parts]
+    parts = [_postorder(part, parent, sizes) for part in parts]
     for part in parts:
-        room = _stacked(part, parent, sizes, left, room)
+        room = _allocate_stacks(part, parent, sizes, left, room)
     tables = {
         "first": first.astype(np.int32),
         "starts": starts.astype(np.int32),
@@ -170,7 +170,7 @@ def _padded(count: Ints) -> Ints:
     return (count + _LANES - 1) // _LANES * _LANES
 
 
-def _parted(parent: Ints, below: Any, work: Any) -> list[Ints]:
+def _partition(parent: Ints, below: Any, work: Any) -> list[Ints]:
     """Divide fronts into two parts of whole subtrees with equal work, and the fronts above; independent of threads."""
     roots = np.flatnonzero(parent < 0).tolist()
     branches, above = roots, 0.0
@@ -201,7 +201,7 @@ def _parted(parent: Ints, below: Any, work: Any) -> list[Ints]:
     return [np.flatnonzero(side_of == side) for side in range(3)]
 
 
-def _sequence(part: Ints, parent: Ints, sizes: Ints) -> Ints:
+def _postorder(part: Ints, parent: Ints, sizes: Ints) -> Ints:
     """Postorder of a part's fronts that minimises the memory of waiting update matrices (Liu 1986)."""
     inside = np.zeros(len(parent), dtype=bool)
     inside[part] = True
@@ -228,7 +228,7 @@ def _sequence(part: Ints, parent: Ints, sizes: Ints) -> Ints:
     return np.array(out[::-1], np.int64)
 
 
-def _stacked(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> int:
+def _allocate_stacks(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> int:
     """Offsets of update matrices on two stacks, for fronts at even and odd depth, so that a front's children are always
     on top of the other stack. Written to ``left``; returns the end of the stacks."""
     inside = np.zeros(len(parent), dtype=bool)

@@ -36,18 +36,18 @@ class Factor:
         self._free = free
         pattern = matrix.rows, matrix.columns
         if reuse is not None and np.array_equal(reuse._free, free):
-            self._take(reuse.elimination, reuse._pattern, (reuse._panels, reuse._work))
+            self._adopt(reuse.elimination, reuse._pattern, (reuse._panels, reuse._work))
             if self._factorised(matrix, threads):
                 self._prepare()
                 return
-            pattern = _both(pattern, reuse._pattern)
+            pattern = _union(pattern, reuse._pattern)
         found = eliminate(*pattern, np.asarray(free.reshape(-1, 3).any(axis=1)))
-        self._take(found, pattern, (np.empty(found.size + 8), np.empty(found.room + 8)))
+        self._adopt(found, pattern, (np.empty(found.size + 8), np.empty(found.room + 8)))
         whole = self._factorised(matrix, threads)
         assert whole, "fronts made for a pattern have room for it"
         self._prepare()
 
-    def _take(self, elimination: Elimination, pattern: tuple[Ints32, Ints32], memory: tuple[Array, Array]) -> None:
+    def _adopt(self, elimination: Elimination, pattern: tuple[Ints32, Ints32], memory: tuple[Array, Array]) -> None:
         self.elimination, self._pattern = elimination, pattern
         self._panels, self._work = memory
 
@@ -111,7 +111,7 @@ _ROOM = 1.15
 the union is used: pairs that were in contact a moment ago are likely to be in contact again."""
 
 
-def _both(pattern: tuple[Ints32, Ints32], before: tuple[Ints32, Ints32]) -> tuple[Ints32, Ints32]:
+def _union(pattern: tuple[Ints32, Ints32], before: tuple[Ints32, Ints32]) -> tuple[Ints32, Ints32]:
     """Union of two patterns of the same size, or the first one if the union is much larger."""
     count = len(pattern[0]) - 1
     one, other = (

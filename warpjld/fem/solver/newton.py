@@ -81,9 +81,9 @@ class Newton:
             if halvings > _HALVINGS or beyond - factor < _BRACKET * factor:
                 message = f"no equilibrium found above load {factor:.4g} (tried {target:.4g}): {status.value}"
                 if beyond < np.inf:
-                    status, message = SolveStatus.LIMIT_LOAD, _limit(factor, beyond)
-                some = tuple(reached) or (self._problem.beginning(),)
-                return Solution(status, some, message, held, self._problem.loads)
+                    status, message = SolveStatus.LIMIT_LOAD, _limit_message(factor, beyond)
+                instants = tuple(reached) or (self._problem.beginning(),)
+                return Solution(status, instants, message, held, self._problem.loads)
             if progress:
                 progress(f"load {target:.3g}: {status.value}; halving the step")
             todo.insert(0, 0.5 * (factor + target))
@@ -212,7 +212,7 @@ class Newton:
         return done
 
 
-def _limit(factor: float, target: float) -> str:
+def _limit_message(factor: float, target: float) -> str:
     return (
         f"limit load: above {factor:.4g} of the load (tried {target:.4g}) no stable equilibrium was found: the body "
         "buckles, snaps through or collapses there"

@@ -33,8 +33,8 @@ class Instant:
     residual: float
 
     def __repr__(self) -> str:
-        told = f"{self.newton} Newton iterations, residual {self.residual:.1e}"
-        return f"Instant(load {self.factor:.3f}, {len(self.displacement)} nodes, {told})"
+        summary = f"{self.newton} Newton iterations, residual {self.residual:.1e}"
+        return f"Instant(load {self.factor:.3f}, {len(self.displacement)} nodes, {summary})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,7 +37,7 @@ _SPINE_DEPTH, _SKULL_DEPTH = 0.42, 0.3  # share of the trunk's depth from the ba
 _NECK = (0.80, 0.92)  # range of heights that is searched for the narrowest section of the neck
 _ELBOW = 0.48  # share of the way from wrist to shoulder
 _SHOULDER = 0.1  # head of the humerus from the midline
-_WIDER = 1.35  # an arm ends where its width exceeds its median width by this factor
+_ARM_WIDENING = 1.35  # an arm ends where its width exceeds its median width by this factor
 _REACH = 1.4  # part of an arm that is taken as its hand, per distance from fingertip to wrist
 _BALL = 0.72  # share of the foot's length from the heel
 _HEEL = 0.13  # share of the foot's length from its back end
@@ -59,9 +59,11 @@ def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the bo
     """
     solid = solid_of(vertices, faces, float(np.ptp(vertices, axis=0).max()) / _GRID).main_piece()
     stance = find_stance(solid, label)
-    solid = VoxelSolid(stance.inward(solid.points), solid.depth / stance.height, solid.size / stance.height, solid.ways)
+    solid = VoxelSolid(
+        stance.inward(solid.points), solid.depth / stance.height, solid.size / stance.height, solid.graph
+    )
     # path lengths are in the solid's unit, too
-    solid.ways.data /= stance.height
+    solid.graph.data /= stance.height
     points: Points = {}
     legs = _legs(solid, points)
     _trunk(solid, points)
@@ -85,7 +87,7 @@ def _slab(solid: VoxelSolid, height: float) -> NDArray[np.bool_]:
     return np.asarray(np.abs(solid.points[:, 1] - height) < 1.2 * solid.size)
 
 
-def _beside(solid: VoxelSolid, height: float, sign: float, place: float | None = None) -> NDArray[np.int64]:
+def _leg_section(solid: VoxelSolid, height: float, sign: float, place: float | None = None) -> NDArray[np.int64]:
     """Voxels of the leg on one side at a height."""
     found = [p for p in pieces(solid, _slab(solid, height)) if sign * solid.points[p, 0].mean() > 0 and len(p) > 8]
     if not found:
@@ -112,13 +114,13 @@ def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
     legs = solid.points[:, 1] < crotch
     middle = solid.points[_slab(solid, high) & (np.abs(solid.points[:, 0]) < 0.12)].mean(axis=0)
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        thigh = solid.points[_beside(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
+        thigh = solid.points[_leg_section(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
         hip = np.array([thigh[0], high, (thigh[2] + middle[2]) / 2])
-        shin = [solid.points[_beside(solid, y, sign)].mean(axis=0) for y in (0.075, 0.14)]
+        shin = [solid.points[_leg_section(solid, y, sign)].mean(axis=0) for y in (0.075, 0.14)]
         ankle = shin[0] + (shin[0] - shin[1]) * (0.075 - _ANKLE) / 0.065
         knee_height = ankle[1] + _KNEE * (hip[1] - ankle[1])
         points[f"{side}.femoral_head"] = hip
-        points[f"{side}.knee"] = solid.points[_beside(solid, knee_height, sign)].mean(axis=0)
+        points[f"{side}.knee"] = solid.points[_leg_section(solid, knee_height, sign)].mean(axis=0)
         points[f"{side}.ankle"] = ankle
         _foot(solid, side, sign, points)
     hips = (points["left.femoral_head"] + points["right.femoral_head"]) / 2
@@ -228,7 +230,7 @@ def _arm(
     widths = np.sqrt(areas)
     at = (np.arange(len(widths)) + 0.5) * step
     usual = float(np.median(widths[(at > 0.26) & (at < 0.34)]))
-    wide = np.flatnonzero((at > 0.25) & (widths > _WIDER * usual))
+    wide = np.flatnonzero((at > 0.25) & (widths > _ARM_WIDENING * usual))
     # the arm's section widens at the armpit; the shoulder joint is at a fixed distance from the midline
     beside = np.flatnonzero((at > 0.25) & (np.abs(line[:, 0]) < _SHOULDER))
     ends = [float(at[found[0]]) for found in (wide, beside) if len(found)]
@@ -237,14 +239,14 @@ def _arm(
     wrist = float(at[near][int(np.argmin(widths[near]))])
     place = dict(zip(("wrist", "elbow", "shoulder"), (wrist, wrist + _ELBOW * (end - wrist), end), strict=True))
     there = {name: np.stack([np.interp(s, at, line[:, k]) for k in range(3)]) for name, s in place.items()}
-    hand = place_hand(*_fine(solid, surface, faces, line, from_tip, wrist), label)
+    hand = place_hand(*_fine_hand(solid, surface, faces, line, from_tip, wrist), label)
     points |= {f"{side}.{name}": point for name, point in hand.items()}
     points[f"{side}.elbow"], points[f"{side}.shoulder"] = there["elbow"], there["shoulder"]
     middle = (place["wrist"] + place["elbow"]) / 2
     points[f"{side}.forearm_twist"] = np.stack([np.interp(middle, at, line[:, k]) for k in range(3)])
 
 
-def _fine(
+def _fine_hand(
     solid: VoxelSolid, surface: Array, faces: NDArray[np.integer], line: Array, from_tip: Array, wrist: float
 ) -> tuple[VoxelSolid, Array]:
     """A hand with part of the forearm as a solid of finer voxels, and a point at the forearm's end."""

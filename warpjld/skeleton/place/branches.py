@@ -37,38 +37,38 @@ def find_branches(solid: VoxelSolid, distance: NDArray[np.float64], least: float
     """
     known = np.flatnonzero(np.isfinite(distance))
     order = known[np.argsort(-distance[known], kind="stable")]
-    ways = (solid.ways + solid.ways.T).tocsr()
-    starts, ends = ways.indptr, ways.indices
+    graph = (solid.graph + solid.graph.T).tocsr()
+    starts, ends = graph.indptr, graph.indices
     owner = np.full(len(distance), -1)
-    above: list[int] = []
+    union_parent: list[int] = []
     peaks: list[int] = []
     own: list[list[int]] = []
     found: list[Branch] = []
 
-    def top(piece: int) -> int:
-        while above[piece] != piece:
-            above[piece] = above[above[piece]]
-            piece = above[piece]
+    def find_root(piece: int) -> int:
+        while union_parent[piece] != piece:
+            union_parent[piece] = union_parent[union_parent[piece]]
+            piece = union_parent[piece]
         return piece
 
     for voxel in order.tolist():
-        pieces = {top(p) for p in owner[ends[starts[voxel] : starts[voxel + 1]]].tolist() if p >= 0}
+        pieces = {find_root(p) for p in owner[ends[starts[voxel] : starts[voxel + 1]]].tolist() if p >= 0}
         if not pieces:
-            above.append(len(above))
+            union_parent.append(len(union_parent))
             peaks.append(voxel)
             own.append([])
-            pieces = {above[-1]}
+            pieces = {union_parent[-1]}
         first = max(pieces, key=lambda p: distance[peaks[p]])
         for piece in pieces - {first}:
             length = float(distance[peaks[piece]] - distance[voxel])
             if length >= least:
                 found.append(Branch(peaks[piece], float(distance[voxel]), np.array(own[piece]), length))
-            above[piece] = first
+            union_parent[piece] = first
             own[first].extend(own[piece] if length < least else ())
         owner[voxel] = first
         own[first].append(voxel)
     if peaks:
-        first = top(0)
+        first = find_root(0)
         far = float(distance[peaks[first]])
         found.append(Branch(peaks[first], 0.0, np.array(own[first]), far))
     return sorted(found, key=lambda branch: -branch.length)

@@ -68,9 +68,9 @@ def place_hand(solid: VoxelSolid, arm: Array | None = None, label: str = "the ha
         )
     furthest = max(digits, key=lambda b: float(distance[b.tip]))
     first_web = max(b.parting for b in digits if b is not furthest)
-    followed = [_follow(solid, distance, b, first_web if b is furthest else b.parting) for b in digits]
-    thumb = followed[_thumb_of(followed)]
-    fingers = [d for d in followed if d is not thumb]
+    traced = [_trace(solid, distance, b, first_web if b is furthest else b.parting) for b in digits]
+    thumb = traced[_thumb_of(traced)]
+    fingers = [d for d in traced if d is not thumb]
     web = float(np.median([float(distance[d.branch.tip]) - d.length for d in fingers]))
     free = float(np.median([d.length for d in fingers]))
     wrist, wrist_at = _wrist(solid, distance, web, free)
@@ -94,11 +94,11 @@ def place_hand(solid: VoxelSolid, arm: Array | None = None, label: str = "the ha
 def _thumb_of(digits: list[_Digit]) -> int:
     """Index of the thumb among five digits: its base is apart from the others and it points another way."""
     bases = np.array([d.line[-1] for d in digits])
-    ways = np.array([unit(d.line[0] - d.line[-1]) for d in digits])
+    directions = np.array([unit(d.line[0] - d.line[-1]) for d in digits])
     apart = np.linalg.norm(bases[:, None] - bases[None], axis=2)
     apart = (apart + np.diag(np.full(len(digits), np.inf))).min(axis=1)
-    astray = [1.0 - float(unit(ways.sum(axis=0) - way) @ way) for way in ways]
-    return int(np.argmax(apart / np.median(apart) + 2.0 * np.array(astray)))
+    deviations = [1.0 - float(unit(directions.sum(axis=0) - way) @ way) for way in directions]
+    return int(np.argmax(apart / np.median(apart) + 2.0 * np.array(deviations)))
 
 
 def _arm_end(solid: VoxelSolid, label: str) -> Array:
@@ -120,7 +120,7 @@ def _arm_end(solid: VoxelSolid, label: str) -> Array:
     return np.asarray(solid.points[outer[int(ranked[-1])]].mean(axis=0))
 
 
-def _follow(solid: VoxelSolid, distance: Array, branch: Branch, web: float) -> _Digit:
+def _trace(solid: VoxelSolid, distance: Array, branch: Branch, web: float) -> _Digit:
     own = branch.voxels[distance[branch.voxels] >= web]
     # distances from the tip within the digit alone
     mine = np.zeros(len(solid.points), dtype=bool)
@@ -134,11 +134,11 @@ def _follow(solid: VoxelSolid, distance: Array, branch: Branch, web: float) -> _
     length = float(distance[branch.tip]) - web
     keep = max(3, int(0.8 * len(line)))  # the last slices lean towards the neighbour: extrapolate straight instead
     line = np.vstack([solid.points[branch.tip], line[1:keep]])
-    line = np.vstack([line, point_at(line, max(length, 1.02 * _long(line)))])
+    line = np.vstack([line, point_at(line, max(length, 1.02 * _arc_length(line)))])
     return _Digit(branch, line, length)
 
 
-def _long(line: Array) -> float:
+def _arc_length(line: Array) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 

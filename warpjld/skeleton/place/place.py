@@ -17,8 +17,8 @@ __all__ = ["propose_points"]
 Array = NDArray[np.float64]
 
 _GRID = 170  # voxels in a hand's diagonal
-_SURE = 0.15  # smallest absolute chirality that decides a hand's side
-_CLOSEST = 4000  # nearest voxels tried for a point that lies outside
+_CLEAR = 0.15  # smallest absolute chirality that decides a hand's side
+_CANDIDATES = 4000  # nearest voxels tried for a point that lies outside
 
 
 def propose_points(
@@ -67,14 +67,14 @@ def _hand(vertices: Array, faces: NDArray[np.integer], side: str | None, label: 
     solid = solid_of(vertices, faces, size).main_piece()
     points = place_hand(solid, label=label)
     turn = chirality(points)
-    if side is None and abs(turn) < _SURE:
+    if side is None and abs(turn) < _CLEAR:
         raise InputError(f"{label}: neither fingers nor thumb tell whether it is a left or a right hand: give --side")
     side = side or ("right" if turn > 0 else "left")
-    points = {f"{side}.{name}": points[name] for name in _order(points)}
+    points = {f"{side}.{name}": points[name] for name in _in_canonical_order(points)}
     return _moved_inside(points, vertices, faces, solid)
 
 
-def _order(points: dict[str, Array]) -> list[str]:
+def _in_canonical_order(points: dict[str, Array]) -> list[str]:
     from warpjld.skeleton.hand import HAND_PARENTS
 
     return [name for name in HAND_PARENTS if name in points]
@@ -92,7 +92,7 @@ def _moved_inside(
         solid = solid_of(vertices, faces, float(np.ptp(vertices, axis=0).max()) / _GRID)
     for j in out:
         away = np.linalg.norm(solid.points - points[names[j]], axis=1)
-        near = np.argsort(away)[:_CLOSEST:8]
+        near = np.argsort(away)[:_CANDIDATES:8]
         inside = near[~outside_surface(vertices, faces, solid.points[near])]
         if len(inside):
             points[names[j]] = solid.points[inside[0]]

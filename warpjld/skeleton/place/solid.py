@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 
 __all__ = ["VoxelSolid", "capped", "solid_of"]
 
-_FINE = 0.3  # largest spacing of surface samples, per voxel: the voxelised surface has no gaps
-_MOST_INSIDE = 200_000  # largest number of voxels of a solid
-_MOST = 6_000_000  # largest number of voxels of a grid
+_SAMPLE_SPACING = 0.3  # largest spacing of surface samples, per voxel: the voxelised surface has no gaps
+_MAX_VOXELS = 200_000  # largest number of voxels of a solid
+_MAX_CELLS = 6_000_000  # largest number of voxels of a grid
 _STEPS = [s for s in np.ndindex(3, 3, 3) if s > (1, 1, 1)]  # half of the 26 neighbours
 
 
@@ -27,17 +27,17 @@ class VoxelSolid:
         points: Voxel centres, shape (N, 3).
         depth: Distance of each centre to the outside, shape (N,).
         size: Edge length of a voxel.
-        ways: Graph of steps between neighbours with their lengths, sparse, shape (N, N), each pair stored once.
+        graph: Steps between neighbours with their lengths, sparse, shape (N, N), each pair stored once.
     """
 
     points: NDArray[np.float64]
     depth: NDArray[np.float64]
     size: float
-    ways: coo_matrix
+    graph: coo_matrix
 
     def distances(self, start: NDArray[np.integer] | int) -> NDArray[np.float64]:
         """Length of the shortest path inside the solid from the nearest start voxel; ``inf`` if unconnected."""
-        return np.asarray(dijkstra(self.ways, directed=False, indices=np.atleast_1d(start), min_only=True))
+        return np.asarray(dijkstra(self.graph, directed=False, indices=np.atleast_1d(start), min_only=True))
 
     def nearest(self, place: NDArray[np.float64]) -> int:
         """Index of the voxel nearest to a place."""
@@ -45,12 +45,12 @@ class VoxelSolid:
 
     def part(self, chosen: NDArray[np.bool_]) -> VoxelSolid:
         """The solid of the chosen voxels."""
-        ways = self.ways.tocsr()[chosen][:, chosen].tocoo()
-        return VoxelSolid(self.points[chosen], self.depth[chosen], self.size, ways)
+        graph = self.graph.tocsr()[chosen][:, chosen].tocoo()
+        return VoxelSolid(self.points[chosen], self.depth[chosen], self.size, graph)
 
     def main_piece(self) -> VoxelSolid:
         """The largest connected piece."""
-        _, label = connected_components(self.ways, directed=False)
+        _, label = connected_components(self.graph, directed=False)
         return self.part(label == np.bincount(label).argmax())
 
 
@@ -80,11 +80,11 @@ def solid_of(
     if low is None or high is None:
         low, high = vertices.min(axis=0), vertices.max(axis=0)
     shape = np.ceil((high - low) / size).astype(int) + 6
-    size = float(size * max(1.0, np.prod(shape.astype(float)) / _MOST) ** (1 / 3))
+    size = float(size * max(1.0, np.prod(shape.astype(float)) / _MAX_CELLS) ** (1 / 3))
     shape = np.ceil((high - low) / size).astype(int) + 6
     origin = low - 2.5 * size
     whole = (origin - size, origin + (shape + 1) * size)
-    cells = np.floor((_samples(vertices, faces, _FINE * size, *whole) - origin) / size).astype(int)
+    cells = np.floor((_samples(vertices, faces, _SAMPLE_SPACING * size, *whole) - origin) / size).astype(int)
     cells = cells[((cells >= 0) & (cells < shape)).all(axis=1)]
     wall = np.zeros(shape, dtype=bool)
     wall[tuple(cells.T)] = True
@@ -102,8 +102,8 @@ def solid_of(
     outside = np.isin(label, reached) & ~wall
     solid = ndimage.binary_erosion(~outside, border_value=1)
     solid &= ~rim
-    if (count := int(solid.sum())) > _MOST_INSIDE:
-        coarser = size * (1.2 * count / _MOST_INSIDE) ** (1 / 3)
+    if (count := int(solid.sum())) > _MAX_VOXELS:
+        coarser = size * (1.2 * count / _MAX_VOXELS) ** (1 / 3)
         return solid_of(vertices, faces, coarser, low=low, high=high, within=within)
     depth = ndimage.distance_transform_edt(~outside) * size - 0.5 * size
     return _connected(solid, depth, origin, size)
@@ -124,8 +124,8 @@ def _connected(
         rows.append(number[here][both])
         columns.append(number[there][both])
         lengths.append(np.full(int(both.sum()), size * float(np.linalg.norm(d))))
-    ways = coo_matrix((np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
-    return VoxelSolid(origin + (np.argwhere(solid) + 0.5) * size, depth[solid], size, ways)
+    graph = coo_matrix((np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
+    return VoxelSolid(origin + (np.argwhere(solid) + 0.5) * size, depth[solid], size, graph)
 
 
 def capped(

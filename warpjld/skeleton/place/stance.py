@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _UPS = ((1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0))
 """Candidates for the up axis: (axis, sign), the usual ones first."""
 _LEGS = (0.12, 0.2, 0.28, 0.36)  # heights, as shares of the whole, at which two legs are expected
-_ALIKE = 1.6  # largest ratio of the two legs' section areas
+_LEG_RATIO = 1.6  # largest ratio of the two legs' section areas
 _TRUNK = (0.56, 0.64)  # heights at which one trunk is expected
 
 
@@ -49,7 +49,7 @@ class Stance:
 def pieces(solid: VoxelSolid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
     """Connected components of the chosen voxels, the largest first."""
     numbers = np.flatnonzero(chosen)
-    _, label = connected_components(solid.part(chosen).ways, directed=False)
+    _, label = connected_components(solid.part(chosen).graph, directed=False)
     found = [numbers[label == k] for k in range(label.max(initial=-1) + 1)]
     return sorted(found, key=len, reverse=True)
 
@@ -63,13 +63,13 @@ def find_stance(solid: VoxelSolid, label: str) -> Stance:
     for axis, sign in _UPS:
         up = np.zeros(3)
         up[axis] = sign
-        found = _stands(solid, up)
+        found = _stance_along(solid, up)
         if found is not None:
             return found
     raise InputError(f"{label}: no upright body with two legs apart from one another")
 
 
-def _stands(solid: VoxelSolid, up: Array) -> Stance | None:
+def _stance_along(solid: VoxelSolid, up: Array) -> Stance | None:
     high = solid.points @ up
     low, height = float(high.min()), float(np.ptp(high))
     share = (high - low) / height
@@ -77,7 +77,7 @@ def _stands(solid: VoxelSolid, up: Array) -> Stance | None:
     legs = []
     for at in _LEGS:
         found = [p for p in pieces(solid, np.abs(share - at) < slab) if len(p) > 20]
-        if len(found) < 2 or len(found[0]) > _ALIKE * len(found[1]):
+        if len(found) < 2 or len(found[0]) > _LEG_RATIO * len(found[1]):
             return None
         if len(found) > 2 and len(found[2]) > 0.5 * len(found[1]):
             return None

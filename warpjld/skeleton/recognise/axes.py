@@ -46,7 +46,7 @@ def _finger_axes(points: Points, digit: str, frame: HandFrame) -> dict[str, NDAr
     expected = _hinge(frame.dorsal, chain[-1] - chain[0])
     hinge = _common_hinge(chain, expected, _FINGER_PRIOR)
     axes = {f"{digit}.carpometacarpal": _hinge(frame.dorsal, chain[0] - carpal)}
-    return axes | _along(digit, chain, hinge)
+    return axes | _axes_along(digit, chain, hinge)
 
 
 def _thumb_axes(points: Points, frame: HandFrame) -> dict[str, NDArray[np.float64]]:
@@ -60,7 +60,7 @@ def _thumb_axes(points: Points, frame: HandFrame) -> dict[str, NDArray[np.float6
     target = bases[-1] - 0.5 * width * frame.dorsal
     bone = chain[-1] - chain[1]
     expected = perpendicular(np.cross(bone, target - chain[1]), bone)
-    return _along("thumb", chain, _common_hinge(chain, expected, _THUMB_PRIOR))
+    return _axes_along("thumb", chain, _common_hinge(chain, expected, _THUMB_PRIOR))
 
 
 def _common_hinge(
@@ -74,7 +74,7 @@ def _common_hinge(
     return unit(np.linalg.solve(bones.T @ bones + prior * np.eye(3), prior * expected))
 
 
-def _along(
+def _axes_along(
     digit: str, chain: Sequence[NDArray[np.float64]], hinge: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
     axes = {

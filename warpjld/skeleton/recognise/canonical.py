@@ -21,7 +21,7 @@ from warpjld.skeleton.recognise.flesh import JointFlesh, without_flesh
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
 from warpjld.skeleton.recognise.leaf_ends import add_leaf_ends
-from warpjld.skeleton.recognise.painted import Painted, let_flesh_lead
+from warpjld.skeleton.recognise.painted import Painted, prefer_skinned_joints
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -31,7 +31,7 @@ __all__ = ["Canonical", "canonical_skeleton"]
 
 _STRAIGHT = np.sin(np.radians(10.0))
 _OTHER = {"left": "right", "right": "left"}
-_SURE = 0.15  # smallest absolute chirality that decides between left and right
+_CLEAR = 0.15  # smallest absolute chirality that decides between left and right
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def canonical_skeleton(
     if place is not None:
         layout.positions[layout.names.index("pelvis")] = place
     if painted is not None:
-        let_flesh_lead(layout, tree, painted)
+        prefer_skinned_joints(layout, tree, painted)
     if roles.body and not placed:
         _extremities(layout, vertices, faces)
     if not placed:
@@ -134,7 +134,7 @@ def _swap_mirrored_sides(tree: SourceTree, roles: Roles) -> None:
         hand
         for hand in sided
         if np.linalg.det(tree.frames[hand.joints.get("wrist", hand.joints["index.base"]), :3, :3]) < 0.0
-        and _seen({name: tree.positions[j] for name, j in hand.joints.items()}) == _OTHER[hand.side or "left"]
+        and _side_by_shape({name: tree.positions[j] for name, j in hand.joints.items()}) == _OTHER[hand.side or "left"]
     ]
     if not sided or len(mirrored) < len(sided):
         return
@@ -148,14 +148,14 @@ def _swap_mirrored_sides(tree: SourceTree, roles: Roles) -> None:
     roles.notes.append("mirrored by its nodes: left and right of its names are exchanged")
 
 
-def _seen(points: Mapping[str, NDArray[np.float64]]) -> str | None:
+def _side_by_shape(points: Mapping[str, NDArray[np.float64]]) -> str | None:
     """Side of a hand by its chirality; None where that is not clear."""
     turn = chirality(points) if {"wrist", "index.base", "pinky.base"} <= set(points) else 0.0
-    return None if abs(turn) < _SURE else ("right" if turn > 0 else "left")
+    return None if abs(turn) < _CLEAR else ("right" if turn > 0 else "left")
 
 
 def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, doubts: list[str]) -> str:
-    seen = _seen(points)
+    seen = _side_by_shape(points)
     chosen = given or hand.side or seen
     if chosen is None:
         raise InputError("neither names nor shape tell whether this is a left or a right hand: give its side")

@@ -28,7 +28,7 @@ __all__ = ["check_limbs"]
 
 _MAP = f"state it with {BY_MAP}"
 _PLAUSIBLE = np.log(2.0)  # largest plausible misfit: lower per upper segment half or twice the usual
-_CLEARLY = np.log(1.3)  # smallest difference of misfits by which one division of a limb is clearly better
+_CLEARLY_BETTER = np.log(1.3)  # smallest difference of misfits by which one division of a limb is clearly better
 _AT_TRUNK = 0.03  # joints nearer to the branching joint than this share of the limb do not belong to it
 _UNEQUAL = 1.25  # suspicious ratio of lengths on both sides
 
@@ -68,8 +68,8 @@ def check_limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Colle
         limbs = _limbs(tree, roles, flesh, kind, stated)
         _divide(tree, limbs, kind)
         for limb in limbs:
-            _settle(tree, roles, limb, kind, stated)
-        _compare(tree, roles, kind)
+            _apply(tree, roles, limb, kind, stated)
+        _compare_sides(tree, roles, kind)
 
 
 def _limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, stated: Collection[str]) -> list[_Limb]:
@@ -82,7 +82,7 @@ def _limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, state
     out = []
     for side, end in ends.items():
         other = ends.get("right" if side == "left" else "left")
-        above = _parting(tree, roles, end, other, trunk)
+        above = _branching_joint(tree, roles, end, other, trunk)
         if above is None:
             continue
         chain = [j for j in path_below(tree, above, end) if j not in trunk]
@@ -132,7 +132,7 @@ def _end(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, side: s
         ankle = whole[ankle_of(tree, whole)]
     else:
         return None
-    _release(roles, ankle)
+    _remove_roles(roles, ankle)
     roles.body[f"{side}.ankle"] = ankle
     roles.notes.append(f"{side}.ankle '{tree.names[ankle]}': by the leg's shape")
     return ankle
@@ -157,7 +157,7 @@ def _wrist(tree: SourceTree, roles: Roles, flesh: JointFlesh, side: str) -> int 
     return wrist
 
 
-def _parting(tree: SourceTree, roles: Roles, end: int, other: int | None, trunk: set[int]) -> int | None:
+def _branching_joint(tree: SourceTree, roles: Roles, end: int, other: int | None, trunk: set[int]) -> int | None:
     """Lowest common ancestor of both limbs of a kind, or of one limb and the trunk."""
     above = tree.ancestors(end)
     if other is not None:
@@ -172,9 +172,9 @@ def _divide(tree: SourceTree, limbs: list[_Limb], kind: _Kind) -> None:
     for limb in limbs:
         first, second = limb.named
         if first is not None and second is not None and _is_plausible(tree, limb, (first, second), kind):
-            limb.found = _less_vague(tree, limb, first, second, kind)
-    open_ = [limb for limb in limbs if limb.found is None]
-    for limb in open_:
+            limb.found = _resolve_ambiguous_name(tree, limb, first, second, kind)
+    undecided = [limb for limb in limbs if limb.found is None]
+    for limb in undecided:
         other = next((o for o in limbs if o is not limb and o.found and len(o.chain) == len(limb.chain)), None)
         if other is not None and other.found is not None and not limb.fixed:
             mirrored = (
@@ -187,13 +187,13 @@ def _divide(tree: SourceTree, limbs: list[_Limb], kind: _Kind) -> None:
         limb.found = _by_geometry(tree, limb, kind)
 
 
-def _less_vague(tree: SourceTree, limb: _Limb, first: int, second: int, kind: _Kind) -> tuple[int, int]:
+def _resolve_ambiguous_name(tree: SourceTree, limb: _Limb, first: int, second: int, kind: _Kind) -> tuple[int, int]:
     """Decide by lengths whether ``Shoulder`` is the joint or the clavicle, ``Hip`` the joint or part of the pelvis."""
     if 0 in limb.fixed or read_name(tree.names[first]).kind not in ("shoulder", "hip"):
         return first, second
     own = divide_limb(tree, limb.chain, kind.ratio, {0: (first,), 1: (second,)})[2]
     other, _, misfit = divide_limb(tree, limb.chain, kind.ratio, {1: (second,)})
-    return (other if misfit + _CLEARLY < own else first), second
+    return (other if misfit + _CLEARLY_BETTER < own else first), second
 
 
 def _by_geometry(tree: SourceTree, limb: _Limb, kind: _Kind) -> tuple[int, int] | None:
@@ -221,7 +221,7 @@ def _is_plausible(tree: SourceTree, limb: _Limb, pair: tuple[int, int], kind: _K
     return limb_misfit(at[first], at[second], end, whole, kind.ratio) < _PLAUSIBLE
 
 
-def _settle(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Collection[str]) -> None:
+def _apply(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Collection[str]) -> None:
     names = (f"{limb.side}.{kind.first}", f"{limb.side}.{kind.second}")
     if limb.found is None:
         first, second = limb.named
@@ -241,7 +241,7 @@ def _settle(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Co
     changed = []
     for name, joint in zip(names, limb.found, strict=True):
         if roles.body.get(name) != joint and name not in stated:
-            _release(roles, joint)
+            _remove_roles(roles, joint)
             roles.body[name] = joint
             changed.append(f"{name} '{tree.names[joint]}'")
     if changed:
@@ -263,12 +263,12 @@ def _clavicle(tree: SourceTree, roles: Roles, limb: _Limb, stated: Collection[st
         roles.notes.append(f"{name} '{tree.names[before[0]]}': by the arm's shape")
 
 
-def _release(roles: Roles, joint: int) -> None:
+def _remove_roles(roles: Roles, joint: int) -> None:
     for name in [name for name, j in roles.body.items() if j == joint]:
         del roles.body[name]
 
 
-def _compare(tree: SourceTree, roles: Roles, kind: _Kind) -> None:
+def _compare_sides(tree: SourceTree, roles: Roles, kind: _Kind) -> None:
     """Report segments of clearly different length on both sides."""
     ends = {h.side: h.joints["wrist"] for h in roles.hands if "wrist" in h.joints} if kind is _ARM else {}
     for a, b in ((kind.first, kind.second), (kind.second, kind.end)):

@@ -25,9 +25,9 @@ def digit_chain(
         flesh: Which joints own skin.
         wrist: The hand's wrist, if known.
     """
-    chain = sorted(joints, key=lambda j: _order(tree, meanings[j], j))
+    chain = sorted(joints, key=lambda j: _sort_key(tree, meanings[j], j))
     if not tree.flat:
-        chain = _one_line(tree, chain)
+        chain = _longest_chain(tree, chain)
     ranks = [meanings[j].rank for j in chain]
     if flesh.known:
         chain, ranks = _without_helpers(tree, chain, meanings, flesh)
@@ -36,17 +36,17 @@ def digit_chain(
     return Digit(chain, ranks)
 
 
-def _order(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int, int]:
+def _sort_key(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int, int]:
     """Sort key: depth, then rank (metacarpal, 01, 02, tip), then number, then index."""
-    return tree.depth(joint), *_place(meaning), joint
+    return tree.depth(joint), *_rank_key(meaning), joint
 
 
-def _place(meaning: Meaning) -> tuple[int, int]:
+def _rank_key(meaning: Meaning) -> tuple[int, int]:
     number = meaning.number or 0
     return (number if meaning.rank is None else meaning.rank), number
 
 
-def _one_line(tree: SourceTree, chain: list[int]) -> list[int]:
+def _longest_chain(tree: SourceTree, chain: list[int]) -> list[int]:
     """The longest chain of ancestors and descendants among joints sorted by depth."""
     best: dict[int, list[int]] = {}
     for j in chain:
@@ -85,7 +85,7 @@ def _without_helpers(
 
 
 def _last_by_rank(chain: list[int], meanings: Sequence[Meaning], fleshy: list[int]) -> int:
-    order = [_place(meanings[j]) for j in chain]
+    order = [_rank_key(meanings[j]) for j in chain]
     return max(k for k, at in enumerate(order) if at <= max(order[chain.index(j)] for j in fleshy))
 
 

@@ -61,7 +61,7 @@ def assign_hands(tree: SourceTree, hands: Sequence[HandDigits], flesh: JointFles
     """Canonical joints of all hands of a file, names without the side; fewer than 25 where the file has fewer."""
     for hand in hands:
         for digit in hand.digits.values():
-            _leave_out_zero_bones(tree, digit)
+            _drop_zero_bones(tree, digit)
     metacarpals = _fingers_begin_with_metacarpals(tree, hands, flesh)
     out = []
     for hand in hands:
@@ -73,7 +73,7 @@ def assign_hands(tree: SourceTree, hands: Sequence[HandDigits], flesh: JointFles
     return out
 
 
-def _leave_out_zero_bones(tree: SourceTree, digit: Digit) -> None:
+def _drop_zero_bones(tree: SourceTree, digit: Digit) -> None:
     """Drop first bones of zero length, such as the metacarpal of Leap's thumb."""
     at = tree.positions
     size = float(np.linalg.norm(np.ptp(at[digit.joints], axis=0))) or 1.0
@@ -108,17 +108,17 @@ def _fingers_begin_with_metacarpals(tree: SourceTree, hands: Sequence[HandDigits
     """
     ratios, spreads, last, thumbs = [], [], [], []
     for hand in hands:
-        open_ = {name: d.joints for name, d in hand.digits.items() if name != "thumb" and _is_open(d)}
-        for chain in open_.values():
+        ambiguous = {name: d.joints for name, d in hand.digits.items() if name != "thumb" and _is_ambiguous(d)}
+        for chain in ambiguous.values():
             first = np.linalg.norm(tree.positions[chain[1]] - tree.positions[chain[0]])
             if hand.wrist is not None and first > 0:
                 ratios.append(float(np.linalg.norm(tree.positions[chain[0]] - tree.positions[hand.wrist]) / first))
             if flesh.known:
                 last.append(float(flesh.shares[chain[-1]] / max(flesh.shares[chain[-2]], 1e-12)))
-        if len(open_) >= 3:
-            heads, second = (_spread(tree.positions[[chain[k] for chain in open_.values()]]) for k in (0, 1))
+        if len(ambiguous) >= 3:
+            heads, second = (_spread(tree.positions[[chain[k] for chain in ambiguous.values()]]) for k in (0, 1))
             spreads.append(heads / second if second > 0 else 1.0)
-        if open_ and "thumb" in hand.digits:
+        if ambiguous and "thumb" in hand.digits:
             thumb = hand.digits["thumb"]
             thumbs.append(len(thumb.joints) - (thumb.ranks[-1] == 4))
     votes = 0.0
@@ -136,7 +136,7 @@ def _fingers_begin_with_metacarpals(tree: SourceTree, hands: Sequence[HandDigits
     return votes > 0
 
 
-def _is_open(digit: Digit) -> bool:
+def _is_ambiguous(digit: Digit) -> bool:
     """Whether neither names nor the number of joints determine a finger's first joint."""
     return len(digit.joints) == 4 and digit.ranks[0] != 0 and digit.ranks[-1] != 4
 

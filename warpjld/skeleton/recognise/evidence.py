@@ -36,15 +36,15 @@ def reject_unfounded(tree: SourceTree, roles: Roles, stated: Collection[str] = (
         words = ", ".join(f"'{tree.names[j]}'" for j in list(hand.joints.values())[:3])
         roles.notes.append(f"{words}{', …' if len(hand.joints) > 3 else ''}: named like fingers, but they form no hand")
     if roles.body and not roles.hands and not _is_body(tree, roles):
-        _forget_body(roles, of_body, doubts)
+        _remove_body(roles, of_body, doubts)
         roles.notes.append("some joints are named like limbs, but they form none: joints keep their names")
-    if roles.body and (_on_all_fours(tree, roles) or _many_legs(tree)):
-        _forget_body(roles, of_body, doubts)
+    if roles.body and (_on_all_fours(tree, roles) or _has_two_legs_on_a_side(tree)):
+        _remove_body(roles, of_body, doubts)
         roles.hands.clear()
         roles.notes.append("an animal's limbs, not an upright body's: joints keep their names")
 
 
-def _forget_body(roles: Roles, notes: int, doubts: int) -> None:
+def _remove_body(roles: Roles, notes: int, doubts: int) -> None:
     """Remove the body, and the notes on its limbs: the first ``notes`` and ``doubts``."""
     roles.body.clear()
     del roles.notes[:notes], roles.suspicious[:doubts]
@@ -82,16 +82,18 @@ def _is_body(tree: SourceTree, roles: Roles) -> bool:
     if tree.flat:
         return len(roles.body) > 2
     pairs = [(f"{side}.{a}", f"{side}.{b}") for side in ("left", "right") for a, b in _SEGMENTS]
-    if any(a in roles.body and b in roles.body and _below(tree, roles.body[a], roles.body[b]) for a, b in pairs):
+    if any(
+        a in roles.body and b in roles.body and _is_descendant(tree, roles.body[a], roles.body[b]) for a, b in pairs
+    ):
         return True
     trunk = [name for name in roles.body if name.startswith(("spine", "neck")) or name == "pelvis"]
     head = roles.body.get("head")
     if head is None:
         return len(trunk) >= 2
-    return any(_below(tree, roles.body[name], head) for name in trunk)
+    return any(_is_descendant(tree, roles.body[name], head) for name in trunk)
 
 
-def _below(tree: SourceTree, above: int, joint: int) -> bool:
+def _is_descendant(tree: SourceTree, above: int, joint: int) -> bool:
     return above in tree.ancestors(joint)
 
 
@@ -121,7 +123,7 @@ def _mean_direction(
     return unit(mean) if np.linalg.norm(mean) > 1e-6 else None
 
 
-def _many_legs(tree: SourceTree) -> bool:
+def _has_two_legs_on_a_side(tree: SourceTree) -> bool:
     """Whether one side has two legs: chains named as legs, of similar length, neither a descendant of the other."""
     for side in ("left", "right"):
         legs = [j for j, name in enumerate(tree.names) if _is_leg(name, side)]

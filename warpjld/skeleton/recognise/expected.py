@@ -115,7 +115,7 @@ def _thumb(side: str, joints: Joints) -> list[Expectation]:
             way = unit(before - at) if off > 0 else unit(after - at)
             detail = f"{1e3 * first:.1f} mm before it, {1e3 * second:.1f} behind"
             found.append(Expectation(names[k], "proportion", at + abs(off) * way, abs(off), detail))
-    return sorted(found, key=lambda one: -one.amount)[:1]
+    return sorted(found, key=lambda expectation: -expectation.amount)[:1]
 
 
 def _knuckles(side: str, chains: Mapping[str, list[Array]], palm: float) -> list[Expectation]:
@@ -164,10 +164,10 @@ def body_expectations(
     pairs = {name[5:]: (place, joints[f"right.{name[5:]}"]) for name, place in joints.items() if _paired(name, joints)}
     if len(pairs) < 4:
         return []
-    left, middle, alike = _midplane(pairs, height)
+    left, middle, alike = _sagittal_plane(pairs, height)
     out = _limbs(joints)
     out += _spine(joints, up, height, left, middle)
-    named = {one.joint for one in out}
+    named = {expectation.joint for expectation in out}
     if not alike:
         return out
     for name, (a, b) in pairs.items():
@@ -195,7 +195,7 @@ def _paired(name: str, joints: Joints) -> bool:
     return name.startswith("left.") and f"right.{name[5:]}" in joints
 
 
-def _midplane(pairs: Mapping[str, tuple[Array, Array]], height: float) -> tuple[Array, Array, bool]:
+def _sagittal_plane(pairs: Mapping[str, tuple[Array, Array]], height: float) -> tuple[Array, Array, bool]:
     """Normal of the sagittal plane (unit, to the left), a point of it, and whether the sides are mirror images."""
     a = np.array([pair[0] for pair in pairs.values()])
     b = np.array([pair[1] for pair in pairs.values()])
@@ -291,10 +291,10 @@ def _spine(joints: Joints, up: Array, height: float, left: Array, middle: Array)
                 Expectation(name, "midline", place, abs(aside), f"{1e3 * abs(aside):.0f} mm off the body's midline")
             )
     while True:
-        wrong = _out_of_row(names, places, up)
+        wrong = _misplaced_along_spine(names, places, up)
         if not wrong:
             return out
-        tried = {name: len(_out_of_row(names, {**places, name: place}, up)) for name, place in wrong.items()}
+        tried = {name: len(_misplaced_along_spine(names, {**places, name: place}, up)) for name, place in wrong.items()}
         name = min(tried, key=lambda n: (tried[n], -float(np.linalg.norm(places[n] - wrong[n]))))
         off = float(np.linalg.norm(joints[name] - wrong[name]))
         places[name] = wrong[name]
@@ -303,7 +303,7 @@ def _spine(joints: Joints, up: Array, height: float, left: Array, middle: Array)
             return out
 
 
-def _out_of_row(names: list[str], places: Joints, up: Array) -> dict[str, Array]:
+def _misplaced_along_spine(names: list[str], places: Joints, up: Array) -> dict[str, Array]:
     """Joints of the spine that are not about half-way between their neighbours, and their expected positions."""
     out = {}
     for below, name, above in zip(names, names[1:], names[2:], strict=False):

@@ -40,9 +40,9 @@ def kept_joints(
             continue
         over = [of_source[k] for k in tree.ancestors(j) if k in of_source]
         below = [of_source[k] for k in tree.subtree(j) if k in of_source]
-        part = of_source and _belongs(tree, j, over, below, size) and not _bends(tree, of_source, flesh, j)
+        part = of_source and _is_part(tree, j, over, below, size) and not _bends_limb(tree, of_source, flesh, j)
         part = part and not _chain_of_its_own(tree, of_source, flesh, j)
-        if j in left_out or _moves_nothing(tree, flesh, j) or part:
+        if j in left_out or _is_inert(tree, flesh, j) or part:
             into = over[0] if over else (below[0] if below else "the joint above")
             merged.setdefault(into, []).append(tree.names[j])
         elif of_source and over and over[0].rpartition(".")[2] in _LIMBS and lies_on_bone(tree, j):
@@ -63,14 +63,14 @@ def kept_joints(
     return kept
 
 
-def _moves_nothing(tree: SourceTree, flesh: JointFlesh, joint: int) -> bool:
+def _is_inert(tree: SourceTree, flesh: JointFlesh, joint: int) -> bool:
     """Whether a joint neither moves skin, nor ends a bone, nor is a branching point of joints with skin."""
     if tree.flat:
         return flesh.known and bool(flesh.bare[joint])
     return bool(flesh.dead[joint] or flesh.passing[joint])
 
 
-def _belongs(tree: SourceTree, joint: int, over: list[str], below: list[str], size: float) -> bool:
+def _is_part(tree: SourceTree, joint: int, over: list[str], below: list[str], size: float) -> bool:
     """Whether an unrecognised joint belongs to a recognised one."""
     beside = [k for k in range(len(tree)) if tree.parents[k] == tree.parents[joint] and k != joint]
     near = [tree.parents[joint], *beside]
@@ -82,7 +82,7 @@ def _belongs(tree: SourceTree, joint: int, over: list[str], below: list[str], si
     return bool(below) or helper or double or in_hand or "head" in over or (not over and tree.flat)
 
 
-def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
+def _bends_limb(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
     """Whether a joint with skin bends a limb between two recognised joints, as an animal's hock does."""
     over = next((k for k in tree.ancestors(joint) if k in of_source), None)
     below = next((k for k in tree.subtree(joint) if k in of_source), None)

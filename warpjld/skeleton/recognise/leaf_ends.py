@@ -26,7 +26,7 @@ _IS_END = re.compile(
 _OWN = 0.5  # smallest weight at which a vertex counts as owned by a joint
 _SMALLEST = 5e-3  # smallest reach of flesh that gets a bone, per size of the skeleton
 _ONE_SIDED = 0.2  # smallest distance of the flesh's centroid from the joint, per reach, that gives a direction
-_GOES_ON = 0.4  # smallest extent of a surface beyond its last joint, per length of the bone before (without weights)
+_CONTINUES = 0.4  # smallest extent of a surface beyond its last joint, per length of the bone before (without weights)
 _SHORTEST, _LONGEST = 0.3, 0.9  # limits of the added bone's length, per reach of the flesh
 _FAR, _MUCH = 2.0, 0.15  # distance from all bones, per thickness, and share of such flesh, that call for another bone
 
@@ -61,9 +61,9 @@ def add_leaf_ends(
         if _IS_END.fullmatch(name) or (kids and not (branches and painted is not None)):
             continue
         if painted is None:
-            end = _along_the_bone(layout, joint, vertices, faces)
+            end = _end_along_bone(layout, joint, vertices, faces)
         else:
-            end = _own_flesh(layout, joint, kids, vertices, faces, painted, _SMALLEST * size)
+            end = _end_of_skin(layout, joint, kids, vertices, faces, painted, _SMALLEST * size)
         if end is not None:
             added = f"{name}.end"
             while added in layout.names:
@@ -74,7 +74,7 @@ def add_leaf_ends(
         layout.notes.append(f"ends of bones added in the surface: {', '.join(found)}")
 
 
-def _along_the_bone(
+def _end_along_bone(
     layout: Layout, joint: int, vertices: NDArray[np.float64], faces: NDArray[np.int32]
 ) -> NDArray[np.float64] | None:
     parent = layout.parents[joint]
@@ -87,10 +87,10 @@ def _along_the_bone(
         return None
     near = nearby(vertices, faces, start, 4.0 * length)
     end = find_extremity(vertices, near, start, bone / length, length)
-    return end if end is not None and np.linalg.norm(end - start) > _GOES_ON * length else None
+    return end if end is not None and np.linalg.norm(end - start) > _CONTINUES * length else None
 
 
-def _own_flesh(
+def _end_of_skin(
     layout: Layout,
     joint: int,
     kids: list[int],
@@ -107,7 +107,7 @@ def _own_flesh(
     start = layout.positions[joint]
     flesh = painted.points[own] - start
     if kids:
-        far = _far_from(flesh, [layout.positions[k] - start for k in kids])
+        far = _far_from_bones(flesh, [layout.positions[k] - start for k in kids])
         if far.mean() < _MUCH:
             return None
         flesh = flesh[far]
@@ -126,10 +126,10 @@ def _own_flesh(
         length = float((end - start) @ direction)
         if _SHORTEST * beyond <= length <= beyond and np.linalg.norm(end - start) < 1.2 * length:
             return end
-    return start + _middle(flesh, direction, beyond)
+    return start + _far_centre(flesh, direction, beyond)
 
 
-def _far_from(flesh: NDArray[np.float64], bones: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
+def _far_from_bones(flesh: NDArray[np.float64], bones: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
     """Mask of flesh, relative to its joint, that is nearly as far from the joint's bones as from the joint itself."""
     away = np.full(len(flesh), np.inf)
     for bone in bones:
@@ -152,7 +152,7 @@ def _direction(layout: Layout, joint: int, flesh: NDArray[np.float64], reach: fl
     return np.asarray(longest if (flesh @ longest).max() >= -(flesh @ longest).min() else -longest)
 
 
-def _middle(flesh: NDArray[np.float64], direction: NDArray[np.float64], beyond: float) -> NDArray[np.float64]:
+def _far_centre(flesh: NDArray[np.float64], direction: NDArray[np.float64], beyond: float) -> NDArray[np.float64]:
     """Centre of the flesh near its far end, relative to the joint, one radius before the end or at least half-way."""
     along = flesh @ direction
     last = flesh[along > 0.6 * beyond]

@@ -66,12 +66,12 @@ class Finding:
     @property
     def message(self) -> str:
         """One line for the user."""
-        said = f"{self.joint} {_WORDS[self.kind]}" + (f": {self.detail}" if self.detail else "")
+        text = f"{self.joint} {_WORDS[self.kind]}" + (f": {self.detail}" if self.detail else "")
         if self.proposal is None:
-            return said
+            return text
         x, y, z = self.proposal
         length = float(np.linalg.norm(self.proposal))
-        return f"{said}; proposed: move it {length:.1f} mm, by ({x:+.1f}, {y:+.1f}, {z:+.1f}) mm"
+        return f"{text}; proposed: move it {length:.1f} mm, by ({x:+.1f}, {y:+.1f}, {z:+.1f}) mm"
 
 
 def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[Finding, ...]:
@@ -82,21 +82,21 @@ def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
         vertices: Rest surface [m], shape (V, 3).
         faces: Its triangles, shape (T, 3), anticlockwise seen from outside.
     """
-    findings = _coincident(skeleton, vertices)
+    findings = _check_coincident(skeleton, vertices)
     ends = _open_ends(vertices, faces)
     inside = _inside(vertices, faces, skeleton.rest, ends)
     for j in np.flatnonzero(~inside):
-        back = _millimetres(_way_back(skeleton, vertices[np.unique(faces)], int(j)))
+        back = _millimetres(_displacement_inside(skeleton, vertices[np.unique(faces)], int(j)))
         findings.append(Finding(skeleton.names[j], "outside", 1.0, "", back))
-    findings += _leaving(skeleton, vertices, faces, inside, ends)
-    findings += _sections(skeleton, vertices, faces, inside)
-    findings += _spine(skeleton, vertices, faces, inside)
-    findings += _expected(skeleton, vertices, faces)
-    findings += _crown(skeleton, vertices, faces)
-    return tuple(_one_a_joint(findings))
+    findings += _check_segments(skeleton, vertices, faces, inside, ends)
+    findings += _check_sections(skeleton, vertices, faces, inside)
+    findings += _check_spine(skeleton, vertices, faces, inside)
+    findings += _check_expected(skeleton, vertices, faces)
+    findings += _check_crown(skeleton, vertices, faces)
+    return tuple(_one_per_joint(findings))
 
 
-def _one_a_joint(findings: list[Finding]) -> list[Finding]:
+def _one_per_joint(findings: list[Finding]) -> list[Finding]:
     """One finding per joint: the first, completed by the first proposal found for that joint."""
     best: dict[str, Finding] = {}
     for one in findings:
@@ -109,7 +109,7 @@ def _one_a_joint(findings: list[Finding]) -> list[Finding]:
     return list(best.values())
 
 
-def _way_back(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> NDArray[np.float64]:
+def _displacement_inside(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> NDArray[np.float64]:
     """Displacement of a joint from outside into the surface: a spine joint to between its neighbours, others past the
     nearest vertex."""
     place = skeleton.rest[joint]
@@ -125,7 +125,7 @@ def _way_back(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> 
     return np.asarray(inwards * (1.0 + 0.01 / max(length, 0.01)))
 
 
-def _crown(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
+def _check_crown(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
     """Check the head's extremity against the centre of the head's rounded top."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     up, _ = body_frame(joints)
@@ -153,7 +153,7 @@ def _millimetres(offset: NDArray[np.float64]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
+def _check_expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
     """Joints that deviate from comparable joints of the same body."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     found = finger_expectations(joints)
@@ -193,7 +193,7 @@ def body_frame(
     return up, np.sign(across[j]) * np.eye(3)[j]
 
 
-def _spine(
+def _check_spine(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], inside: NDArray[np.bool_]
 ) -> list[Finding]:
     """Joints of the spine too near to belly or back."""
@@ -215,7 +215,7 @@ def _spine(
     return out
 
 
-def _coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Finding]:
+def _check_coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Finding]:
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     pairs = close_pairs(skeleton.rest, 1e-3 * size)
     out = []
@@ -263,7 +263,7 @@ def _inside(
     return inside
 
 
-def _leaving(
+def _check_segments(
     skeleton: Skeleton,
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
@@ -285,7 +285,7 @@ def _leaving(
     return out
 
 
-def _sections(
+def _check_sections(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], inside: NDArray[np.bool_]
 ) -> list[Finding]:
     """Check the flesh on the four sides of every joint, and beyond every extremity."""
@@ -302,7 +302,7 @@ def _sections(
         name = skeleton.names[j]
         digit = _in_digit(name)
         if digit:
-            out += _digit(name, bone[k], axis[k], up, down)
+            out += _check_digit(name, bone[k], axis[k], up, down)
         ratios = []
         for a, b, side in ((up, down, ("back", "front")), (left, right, ("one side", "other side"))):
             if np.isfinite(a) and np.isfinite(b) and a + b <= _NARROW * min(up + down, left + right):
@@ -327,7 +327,9 @@ def _in_digit(name: str) -> bool:
     return digit in DIGITS or digit.startswith("toe")
 
 
-def _digit(name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back: float, front: float) -> list[Finding]:
+def _check_digit(
+    name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back: float, front: float
+) -> list[Finding]:
     """Check whether a digit's joint is too near to the digit's back or pad."""
     whole = back + front
     if not np.isfinite(whole) or name.endswith(("carpometacarpal", "thumb.base")):

@@ -24,8 +24,8 @@ def reconnect(tree: SourceTree) -> SourceTree:
     ways = [_followers(tree, sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)]
     # straight fingers can be followed in both directions: outwards they spread
     ways = [way for way in ways if _spread(tree, _ends(way)) > _spread(tree, _heads(way))]
-    best = max(ways, key=_links, default=[])
-    if _links(best) < 0.6 * len(tree):
+    best = max(ways, key=_count_links, default=[])
+    if _count_links(best) < 0.6 * len(tree):
         return tree
     ends, heads = _ends(best), _heads(best)
     middle = tree.positions[ends].mean(axis=0)
@@ -65,5 +65,5 @@ def _spread(tree: SourceTree, joints: list[int]) -> float:
     return float(np.linalg.norm(tree.positions[joints].std(axis=0))) if joints else 0.0
 
 
-def _links(after: list[int]) -> int:
+def _count_links(after: list[int]) -> int:
     return sum(j >= 0 for j in after)

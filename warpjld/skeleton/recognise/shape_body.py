@@ -46,13 +46,13 @@ def _legs(tree: SourceTree, trunk: list[int]) -> tuple[list[list[int]], int]:
     for joint in trunk[1:]:
         heads = [c for c in tree.children[joint] if c not in trunk]
         if heads:
-            chains = [c for head in heads if len(c := _single_file(tree, head)) >= 3]
+            chains = [c for head in heads if len(c := _unbranched_chain(tree, head)) >= 3]
             if len(chains) >= 2:
                 return sorted(chains, key=lambda c: -_length(tree, c))[:2], joint
     return [], trunk[-1]
 
 
-def _single_file(tree: SourceTree, head: int) -> list[int]:
+def _unbranched_chain(tree: SourceTree, head: int) -> list[int]:
     chain = [head]
     while len(tree.children[chain[-1]]) == 1:
         chain.append(tree.children[chain[-1]][0])
@@ -81,7 +81,7 @@ def _head(tree: SourceTree, chest: int, wrists: list[int]) -> dict[str, int]:
     rest = [c for c in tree.children[chest] if not any(c == w or c in tree.ancestors(w) for w in wrists)]
     if not rest:
         return {}
-    chain = max((_single_file(tree, head) for head in rest), key=lambda c: _length(tree, c))
+    chain = max((_unbranched_chain(tree, head) for head in rest), key=lambda c: _length(tree, c))
     leaf = not tree.children[chain[-1]]
     last = len(chain) - 2 if leaf and len(chain) >= 3 else len(chain) - 1  # a third joint is the top of the head
     return {"head": chain[last]} | {f"neck{n}": joint for n, joint in enumerate(chain[:last], start=1)}
