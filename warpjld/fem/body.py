@@ -163,5 +163,5 @@ class Body:
             raise InputError(
                 f"mesh: {count} of {len(lowest)} elements have a negative Jacobian, the worst is element {worst} "
                 f"({lowest[worst]:.3g} m³/8) in region '{self.mesh.region_names[self.mesh.regions[worst]]}': "
-                "corners out of order, or the element is turned inside out"
+                "nodes in the wrong order, or the element is inverted"
             )

@@ -45,8 +45,8 @@ def warn_of_rotation(body: Body, displacement: Array) -> None:
         if least > _MOST:
             angle = np.degrees(np.arcsin(min(least, 1.0)))
             warnings.warn(
-                f"'{body.mesh.region_names[number]}' turns by some {angle:.0f}°, which its linear law takes for "
-                "strain: sizes and forces are wrong; want a law for large strain (NeoHooke)",
+                f"'{body.mesh.region_names[number]}' rotates by about {angle:.0f}°, which its linear law treats "
+                "as strain: dimensions and forces are wrong; use a large-strain law (NeoHooke)",
                 MaterialWarning,
                 stacklevel=3,
             )

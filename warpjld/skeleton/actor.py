@@ -72,7 +72,7 @@ def hand_points(skeleton: Skeleton) -> ActorSkeleton:
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     sides = [side for side in ("left", "right") if f"{side}.index.base" in joints]
     if not sides:
-        raise InputError("named points are a body's or a hand's: this skeleton is neither")
+        raise InputError("named points need a body or a hand: this skeleton has neither")
     wanted = [name for side in sides for name in hand_joint_names(side)]
     return ActorSkeleton(
         {name: joints[name] for name in wanted if name in joints}, tuple(n for n in wanted if n not in joints)

@@ -118,7 +118,9 @@ def arm_of(skeleton: Skeleton, side: str) -> Arm:
             break
         joint = int(skeleton.parents[joint])
     if joint < 0 or skeleton.parents[top] < 0:
-        raise InputError(f"no {side} arm: its wrist does not hang on its shoulder, or the shoulder on nothing")
+        raise InputError(
+            f"no {side} arm: its wrist must be a descendant of its shoulder, and the shoulder must have a parent"
+        )
     rows, limits = [], []
     for k, number in enumerate(chain):
         for channel in _MOVING.get(skeleton.names[number].rpartition(".")[2], ()):

@@ -27,12 +27,12 @@ __all__ = [
 ]
 
 _MOTIONS = (
-    "moving along x",
-    "moving along y",
-    "moving along z",
-    "turning about x",
-    "turning about y",
-    "turning about z",
+    "translation along x",
+    "translation along y",
+    "translation along z",
+    "rotation about x",
+    "rotation about y",
+    "rotation about z",
 )
 
 
@@ -182,7 +182,7 @@ def refuse_free(body: Body, prescribed: Prescribed) -> None:
     regions = [body.mesh.region_names[r] for r in np.unique(body.mesh.regions[inside])]
     free = [_MOTIONS[k] for k in range(6) if np.abs(left[k]).max() > 0.3]
     raise FreeBodyError(
-        f"the body of {len(nodes)} nodes ({', '.join(regions)}) is not held: free in {', '.join(free)}"
+        f"the body of {len(nodes)} nodes ({', '.join(regions)}) is not constrained: free are {', '.join(free)}"
         + (f" (and {len(found) - 1} more bodies)" if len(found) > 1 else "")
         + ". Prescribe displacements, or hold free bodies with free='hold'"
     )

@@ -22,15 +22,15 @@ class SolveStatus(Enum):
 
     CONVERGED = "converged"
     STAGNATED = "the residual stopped falling before the tolerance was reached"
-    INDEFINITE = "the stiffness is not positive definite: a body is free, unstable, or an element is turned inside out"
+    INDEFINITE = "the stiffness is not positive definite: a body is free, unstable, or an element is inverted"
     NOT_FINITE = "a number became infinite or undefined"
     MAX_ITERATIONS = "the iterations allowed were not enough"
     LIMIT_LOAD = "a limit load: beyond it no stable equilibrium was found"
-    INVERTED = "elements were turned inside out, however small the step"
+    INVERTED = "elements were inverted even by the smallest step"
     SLIDING = "slides: friction is not enough to hold it"
-    UNHELD = "nothing holds it"
-    BLOCKED = "bodies overlap where all that meets is prescribed"
-    PASSED = "bodies would pass through each other, or lie deep in one another, and nothing parts them"
+    UNHELD = "a body is not constrained"
+    BLOCKED = "bodies overlap where both sides are prescribed"
+    PASSED = "bodies would pass through each other, or overlap so far that contact cannot separate them"
     STOPPED = "stopped as asked"
 
 

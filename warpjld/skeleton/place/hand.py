@@ -63,8 +63,7 @@ def place_hand(solid: VoxelSolid, arm: Array | None = None, label: str = "the ha
     digits = find_branches(solid, distance, _LEAST * float(distance[np.isfinite(distance)].max()))[:5]
     if len(digits) < 5:
         raise InputError(
-            f"{label}: {len(digits)} digits stand apart from one another, five are wanted: "
-            "spread the fingers of the digitised hand"
+            f"{label}: found {len(digits)} separate digits, expected five: spread the fingers of the digitised hand"
         )
     furthest = max(digits, key=lambda b: float(distance[b.tip]))
     first_web = max(b.parting for b in digits if b is not furthest)
@@ -111,12 +110,12 @@ def _arm_end(solid: VoxelSolid, label: str) -> Array:
     thick = [len(voxels) for voxels in outer]
     if len(ends) < 6:
         raise InputError(
-            f"{label}: {len(ends)} ends stand out, five digits and an arm are wanted: "
+            f"{label}: found {len(ends)} extremities, expected five digits and an arm: "
             "spread the fingers of the digitised hand"
         )
     ranked = np.argsort(thick)
     if thick[ranked[-1]] < _THICK * thick[ranked[-2]]:
-        raise InputError(f"{label}: no end is clearly thicker than the others, as a wrist is beside fingers")
+        raise InputError(f"{label}: no extremity is clearly thicker than the others, as a forearm should be")
     return np.asarray(solid.points[outer[int(ranked[-1])]].mean(axis=0))
 
 

@@ -49,7 +49,7 @@ def propose_points(
     number[used] = np.arange(len(used))
     vertices, faces = np.asarray(vertices, dtype=np.float64)[used], number[faces]
     if not len(faces) or not np.ptp(vertices, axis=0).max() > 0.0:
-        raise InputError(f"{label}: encloses nothing")
+        raise InputError(f"{label}: has no triangles, or no extent")
     if side is not None:
         return _hand(vertices, faces, side, label)
     try:
@@ -68,7 +68,7 @@ def _hand(vertices: Array, faces: NDArray[np.integer], side: str | None, label: 
     points = place_hand(solid, label=label)
     turn = chirality(points)
     if side is None and abs(turn) < _CLEAR:
-        raise InputError(f"{label}: neither fingers nor thumb tell whether it is a left or a right hand: give --side")
+        raise InputError(f"{label}: cannot tell by fingers and thumb whether it is a left or a right hand: give --side")
     side = side or ("right" if turn > 0 else "left")
     points = {f"{side}.{name}": points[name] for name in _in_canonical_order(points)}
     return _moved_inside(points, vertices, faces, solid)

@@ -158,7 +158,7 @@ def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str
     seen = _side_by_shape(points)
     chosen = given or hand.side or seen
     if chosen is None:
-        raise InputError("neither names nor shape tell whether this is a left or a right hand: give its side")
+        raise InputError("cannot tell by names or shape whether this is a left or a right hand: give its side")
     if seen not in (None, chosen):
         doubts.append(
             f"named a {chosen} hand, but thumb and fingers look like a {seen} one, or bend backwards at rest: "
