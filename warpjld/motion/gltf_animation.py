@@ -172,8 +172,8 @@ def _read_channels(document: Document, animations: list[Any]) -> tuple[list[_Key
 def _worlds(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:
     """World transforms of all nodes, shape (F, N, 4, 4), as ``JointAnimation.worlds`` has them, and warnings.
 
-    Positions are those of the file. Where a scale becomes negative that was not so at rest, axes are those of its
-    absolute value, since a mirrored frame is no rotation.
+    Positions are those of the file. Where a scale becomes negative that was not so at rest, axes are computed with
+    its sign at rest, since a mirrored frame is no rotation.
     """
     count = len(document.gltf.nodes)
     by_node: dict[int, dict[str, _Keys]] = {}
@@ -221,7 +221,7 @@ def _animated(
     document: Document, node: int, keys: dict[str, _Keys], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[NDArray[np.float64], int] | None]:
     """Transforms of a node relative to its parent, shape (F, 4, 4); if its scale changes sign, also the linear parts
-    with that sign kept, shape (F, 3, 3), and the first such frame."""
+    without the change of sign, shape (F, 3, 3), and the first such frame."""
     fixed = dict(zip(_PATHS, document.parts(node), strict=True))
     values = {p: keys[p](at) if p in keys else np.tile(fixed[p], (len(at), 1)) for p in _PATHS}
     turn = transform.Rotation.from_quat(values["rotation"]).as_matrix()

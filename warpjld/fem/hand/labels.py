@@ -117,7 +117,7 @@ def fringes(
         faces: Skin faces, shape (F, 2).
         label: Their labels, shape (F,).
         names: Names of the labels.
-        width: Distance from that phalanx at which the factor would be 1 without the dead zone of half of it [m].
+        width: Width of the transition [m]: the factor is 0 up to half of it from that phalanx, 1 from one and a half.
     """
     from scipy.spatial import cKDTree
 

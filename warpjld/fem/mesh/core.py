@@ -30,7 +30,7 @@ def core_cells(inside: Mask) -> Mask:
 
 
 def make_manifold(cells: Mask, spare: Mask | None = None) -> Mask:
-    """Change a minimal number of cells until no two cells, and no two empty ones, meet at an edge or corner only.
+    """Change as few cells as needed until no two cells, and no two empty ones, meet at an edge or corner only.
 
     Args:
         cells: Mask of cells, with an empty margin.

@@ -69,8 +69,8 @@ def eliminate(rows: Ints32, columns: Ints32, active: Mask) -> Elimination:
 
 
 def work_by_profile(rows: Ints32, columns: Ints32, active: Mask) -> float:
-    """Multiplications of a factorisation in Cuthill–McKee order: fast to estimate, and an upper bound for a
-    minimum-degree order for long or thin bodies.
+    """Multiplications of a factorisation in Cuthill–McKee order: fast to compute, and more than in a minimum-degree
+    order for long or thin bodies.
 
     Args:
         rows, columns, active: As in ``eliminate``.
