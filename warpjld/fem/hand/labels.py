@@ -117,7 +117,7 @@ def fringes(
         faces: Skin faces, shape (F, 2).
         label: Their labels, shape (F,).
         names: Names of the labels.
-        width: Width of the transition [m]: the factor is 0 up to half of it from that phalanx, 1 from one and a half.
+        width: Width of the transition [m]: the factor is 0 up to half a width from that phalanx, 1 from 1.5 widths.
     """
     from scipy.spatial import cKDTree
 
