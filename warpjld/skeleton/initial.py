@@ -74,8 +74,8 @@ def bent_limbs(skeleton: Skeleton) -> dict[int, float]:
 
 
 def bent_as_before(before: Skeleton, after: Skeleton) -> Skeleton:
-    """``after``, a skeleton whose joints or axes were moved, with updated initial angles: those that followed from joint
-    positions in ``before`` are computed anew, stated ones are kept."""
+    """``after``, a skeleton whose joints or axes were moved, with updated initial angles: those that followed from the
+    joint positions in ``before`` are computed anew, stated ones are kept."""
     old, new = bent_limbs(before), bent_limbs(after)
     initial, limits = after.initial.copy(), after.limits.copy()
     for joint, angle in old.items():

@@ -45,7 +45,7 @@ class _Joint:
 
 
 def write_bvh(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a motion of a rig's own joints as BVH; a :class:`~warpjld.motion.out.write.Writer`.
+    """Write a motion of a rig's own joints as BVH; a :class:`~warpjld.motion.out.write.MotionWriter`.
 
     BVH holds one hierarchy, so several roots get a common parent at the origin.
     """

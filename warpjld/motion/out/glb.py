@@ -32,7 +32,7 @@ _SHEARED = 1e-3  # smallest shear that is reported, per scale of the joint
 
 
 def write_glb(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a motion of a rig's own joints as binary glTF; a :class:`~warpjld.motion.out.write.Writer`."""
+    """Write a motion of a rig's own joints as binary glTF; a :class:`~warpjld.motion.out.write.MotionWriter`."""
     motion = source_motion(rig, poses)
     notes = list(motion.notes)
     warnings: list[str] = []

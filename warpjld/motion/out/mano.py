@@ -21,7 +21,7 @@ __all__ = ["hand_parameters", "write_mano"]
 
 
 def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a hand's motion as MANO-family parameters; a :class:`~warpjld.motion.out.write.Writer`.
+    """Write a hand's motion as MANO-family parameters; a :class:`~warpjld.motion.out.write.MotionWriter`.
 
     Fields: ``global_orient`` (F, 3) and ``hand_pose`` (F, 45), axis-angle [rad]; ``transl`` (F, 3), the wrist's
     position [m]; ``joint_order`` (15 names), ``side``, ``fps``, ``flat_hand_mean`` (true: zero rotations are the flat

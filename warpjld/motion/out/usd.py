@@ -38,7 +38,7 @@ _SAME = 1e-9  # tolerance of the placing, per unit of the file
 
 
 def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSkin | None = None) -> WrittenMotion:
-    """Write a motion of a rig's own joints as USD; a :class:`~warpjld.motion.out.write.Writer`.
+    """Write a motion of a rig's own joints as USD; a :class:`~warpjld.motion.out.write.MotionWriter`.
 
     Args:
         path: The file.
