@@ -63,12 +63,12 @@ def shares_of_skin(mesh: HexMesh, envelope: Envelope, skin: float) -> NDArray[np
     """Share of each element's volume within the skin's thickness [m] of a surface, shape (E,)."""
     depth = -envelope.ask(mesh.nodes).distance[mesh.elements]
     out = (depth.max(axis=1) < skin).astype(np.float64)
-    some = np.flatnonzero((depth.min(axis=1) < skin) & (depth.max(axis=1) >= skin))
+    partial = np.flatnonzero((depth.min(axis=1) < skin) & (depth.max(axis=1) >= skin))
     places = (np.arange(_ACROSS) + 0.5) / _ACROSS
     u, v, w = (grid.ravel() for grid in np.meshgrid(places, places, places, indexing="ij"))
     square = [(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v]
     shape = np.stack([*(corner * (1 - w) for corner in square), *(corner * w for corner in square)])
-    out[some] = (depth[some] @ shape < skin).mean(axis=1)
+    out[partial] = (depth[partial] @ shape < skin).mean(axis=1)
     return out
 
 

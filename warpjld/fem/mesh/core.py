@@ -158,8 +158,8 @@ class _CellDepths:
 
     def __init__(self, envelope: Envelope, grid: Array, deep: Mask, inside: Mask, spacing: float) -> None:
         self.inside = core_cells(deep)
-        some = ~core_cells(~inside)
-        places = np.stack(np.nonzero(some), axis=1)
+        touching = ~core_cells(~inside)
+        places = np.stack(np.nonzero(touching), axis=1)
         ask = _HalfGridDepths(envelope, grid, spacing)
         middle = ask.depth(2 * places + 1)
         # the surface may pass between corners that are all inside, as the gap between two fingers does, but not near a

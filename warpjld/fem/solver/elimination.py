@@ -103,8 +103,8 @@ def _fronts(lower: Any) -> tuple[Ints, list[Ints32]]:
     count = lower.shape[0]
     sizes = np.diff(lower.indptr)
     second = np.full(count, count)
-    some = sizes > 1
-    second[some] = lower.indices[lower.indptr[:-1][some] + 1]
+    has_below = sizes > 1
+    second[has_below] = lower.indices[lower.indptr[:-1][has_below] + 1]
     begins = np.ones(count + 1, dtype=bool)
     begins[1:-1] = (second[:-1] != np.arange(1, count)) | (sizes[1:] != sizes[:-1] - 1)
     starts = np.flatnonzero(begins)
