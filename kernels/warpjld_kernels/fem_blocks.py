@@ -1,8 +1,8 @@
-"""Products with sparse matrices of 3×3 blocks, and the smoother built on them.
+"""Products with sparse matrices of 3×3 blocks, and Chebyshev smoothing.
 
-One function a row, in portable C++: on the CPU the first eight of a block's nine entries are one vector register, so
-the product runs at the speed of memory; on a GPU the same row is nine scalar multiply-adds a block.
-Vectors carry at least one value more than they need, since three values are loaded as four.
+One function per row, in portable C++: on the CPU the first eight of a block's nine entries are one vector register, so
+that memory bandwidth limits the product; on a GPU a row is nine scalar multiply-adds per block.
+Vectors have at least one spare value at the end, since three values are loaded as four.
 """
 
 from typing import Any
@@ -63,7 +63,7 @@ def row_product(  # noqa: F811
 
 @wp.func
 def values_at(node: int, x: wp.array(dtype=Any)):
-    """The three values of a node."""
+    """The three components at a node."""
     return wp.vector(x[3 * node], x[3 * node + 1], x[3 * node + 2])
 
 
@@ -76,7 +76,7 @@ def set_values(node: int, s: Any, x_out: wp.array(dtype=Any)):
 
 @wp.func
 def scaled(node: int, i: int, inverse: wp.array(dtype=Any), r: Any):
-    """One value of D⁻¹ r at a node; D⁻¹ holds inverted diagonal blocks."""
+    """Component i of D⁻¹ r at a node; ``inverse`` holds the inverted diagonal blocks."""
     at = 9 * node + 3 * i
     return inverse[at] * r[0] + inverse[at + 1] * r[1] + inverse[at + 2] * r[2]
 
@@ -178,7 +178,7 @@ def interpolate(
     # out
     y_out: wp.array(dtype=Any),
 ):
-    """y = W x or y + W x, one scalar weight for the three values of a node: prolongation, or restriction with Wᵀ."""
+    """y = W x or y + W x, one scalar weight for the three components of a node: prolongation, or restriction by Wᵀ."""
     row = first + wp.tid()
     zero = weights.dtype(0.0)
     s = wp.vector(zero, zero, zero)
@@ -189,7 +189,7 @@ def interpolate(
     set_values(row, s, y_out)
 
 
-# both precisions at once: one module to compile, whichever is asked for first
+# both precisions in one module, which is compiled once
 for _real in (wp.float32, wp.float64):
     _values = wp.array(dtype=_real)
     _table = {"values": _values}

@@ -1,20 +1,20 @@
-"""Stiffness and internal forces of 8-node elements, added straight into the rows of the global matrix.
+"""Stiffness and internal forces of 8-node elements, assembled directly into the rows of the global matrix.
 
-Elements are taken eight at a time: every number below is a vector of eight, one lane an element, so that the arithmetic
-is vectorised whatever the mesh. A range of rows is owned by one index of the launch, which visits every element that
-touches them, in ascending order, and adds only into its own rows: no atomics, and every sum in the same order however
-the rows are divided. Elements at the border of two ranges are computed by both.
+Elements are processed eight at a time: every value below is a vector of eight, one lane per element, so that the
+arithmetic is vectorised for any mesh. A range of rows is owned by one index of the launch, which visits every element
+that touches them, in ascending order, and adds to its own rows only: no atomics, and the order of summation does not
+depend on the ranges. Elements at the border of two ranges are computed by both.
 
-Laws are written as an isochoric Kirchhoff stress τ and its spatial tangent c at each of 2×2×2 points, and one pressure
+Laws are given by an isochoric Kirchhoff stress τ and its spatial tangent c at each of 2×2×2 points, and one pressure
 per element (mean dilatation), whose small-strain limit is the B-bar element:
 
     f_a  = Σ_q τ g_a dV + p G_a,          g_a = ∂N_a/∂x,  G_a = Σ_q g_a dv
     K_ab = Σ_q (g_aᵀ c g_b + (g_a·τ g_b) 1) dV + Σ_q p (g_a ⊗ g_b − g_b ⊗ g_a) dv + U''(θ)/V G_a ⊗ G_b
     U(θ) = κ/2 (θ − 1)²,  p = U'(θ),  θ = v/V
 
-The p of K_ab's second sum is an argument: with p itself K is the exact tangent; with the pressure that the last Newton
-step predicted, κ (θ − 1 + Σ G_a·Δu_a / V), it is the tangent of the mixed method, whose steps stay large where κ ≫ μ.
-Laws with full integration have p in their τ and c, at every point.
+The p in K_ab's second sum is an argument: with the current p, K is the exact tangent; with the pressure predicted by
+the last Newton step, κ (θ − 1 + Σ G_a·Δu_a / V), it is the tangent of the mixed method, whose steps stay large for
+κ ≫ μ. Laws with full integration include p in τ and c at every point.
 """
 
 import warp as wp
@@ -26,12 +26,12 @@ from warpjld_kernels.lanes import VECTORISED, prelude
 wp.set_module_options(VECTORISED)
 
 LANES = 8
-"""Elements computed together."""
+"""Number of elements processed together."""
 
 
 @wp.struct
 class Batches:
-    """Ranges of rows; where each range's batches begin; elements, law and count of elements of each batch."""
+    """Ranges of rows; start of each range's batches; elements, law and number of elements of each batch."""
 
     ranges: wp.array(dtype=wp.int32)
     first: wp.array(dtype=wp.int32)
@@ -42,7 +42,7 @@ class Batches:
 
 @wp.struct
 class Model:
-    """Places of the nodes; corners of the elements, the blocks they add to, c10, c01, κ and β, initial stress."""
+    """Node positions; element nodes, the blocks they add to, c10, c01, κ and β, initial stress."""
 
     nodes: wp.array(dtype=wp.float64)
     elements: wp.array2d(dtype=wp.int32)
@@ -53,7 +53,7 @@ class Model:
 
 @wp.struct
 class State:
-    """Displacement; pressures that K takes; displacement that is about to be added."""
+    """Displacement; pressures used in K; displacement about to be added."""
 
     displacement: wp.array(dtype=wp.float64)
     pressures: wp.array(dtype=wp.float64)
@@ -62,7 +62,7 @@ class State:
 
 @wp.struct
 class Sums:
-    """Blocks, internal forces, least Jacobian determinant and foreseen pressure of each element."""
+    """Blocks, internal forces, smallest Jacobian determinant and extrapolated pressure of each element."""
 
     values: wp.array(dtype=wp.float64)
     forces: wp.array(dtype=wp.float64)
@@ -227,5 +227,5 @@ def assemble(
     # out: values and forces are zero before
     out: Sums,
 ):
-    """Tangent blocks, internal forces, and the lowest Jacobian determinant of each element, at a displacement."""
+    """Tangent blocks, internal forces, and smallest Jacobian determinant of each element, at a displacement."""
     add_elements(first + wp.tid(), batches, model, state, want_stiffness, out)

@@ -1,12 +1,12 @@
-"""Cholesky factors of sparse matrices of 3×3 blocks, by the multifrontal method (Duff & Reid 1983), and their solves.
+"""Multifrontal Cholesky factorisation of sparse matrices of 3×3 blocks (Duff & Reid 1983), and solves.
 
-Nodes are eliminated in an order that keeps fill low; those with like columns together, as a *front*. A front is a dense
-lower triangle of its own columns and of all rows that they touch: what the matrix has there, and what the fronts below
-it (its children) leave to eliminate, is added up; its own columns are factorised, and what they leave is handed on to
-its parent. All sums are in one order, so that the result does not depend on how fronts are shared between threads.
+Nodes are eliminated in a fill-reducing order; consecutive ones with similar columns form a *front*. A front is a dense
+lower triangle of its own columns and of all rows that they touch: entries of the matrix and the update matrices of its
+children are summed up; its own columns are factorised, and the update matrix of the rest is passed to its parent. The
+order of summation is fixed, so that the result does not depend on the distribution of fronts over threads.
 
-Panels are stored by columns, ``stride`` numbers each (a front's rows, rounded up to eight). Of what is left over, only
-the lower triangle means anything.
+Panels are stored by columns of ``stride`` values each (a front's rows, rounded up to a multiple of eight). Of update
+matrices only the lower triangle is valid.
 """
 
 import warp as wp
@@ -20,10 +20,10 @@ wp.set_module_options(VECTORISED)
 class Fronts:
     """F fronts in postorder.
 
-    ``first`` are their first columns, shape (F + 1,); ``rows[starts[f] … starts[f + 1]]`` all their rows, their own
-    columns first, numbered in the order of elimination; ``children[child[f] … child[f + 1]]`` the fronts below.
-    ``panel`` and ``left`` say where panels and what is left over begin. The fronts ``todo[parts[p] … parts[p + 1]]``
-    are done one after the other, those of several p side by side.
+    ``first`` holds their first columns, shape (F + 1,); ``rows[starts[f] … starts[f + 1]]`` all rows of front f, own
+    columns first, as positions in the elimination order; ``children[child[f] … child[f + 1]]`` its children.
+    ``panel`` and ``left`` are the offsets of panels and update matrices. The fronts ``todo[parts[p] … parts[p + 1]]``
+    are processed in sequence, different p in parallel.
     """
 
     first: wp.array(dtype=wp.int32)
@@ -39,7 +39,7 @@ class Fronts:
 
 @wp.struct
 class Blocks:
-    """The matrix; nodes in the order of elimination, the place of each node in it or -1; 1 where free, 0 elsewhere."""
+    """The matrix; nodes in elimination order, position of each node in it or -1; 1 for free, 0 for prescribed ones."""
 
     rows: wp.array(dtype=wp.int32)
     columns: wp.array(dtype=wp.int32)
@@ -91,7 +91,7 @@ def has_room(
     # out
     failed: wp.array(dtype=wp.int32),
 ):
-    """``failed`` is -1 where the matrix has what no front of a range has room for."""
+    """Set ``failed`` to -1 if the matrix has entries outside the fronts of a range."""
     look_for_room(first + wp.tid(), fronts, matrix, number, failed)
 
 
@@ -233,7 +233,7 @@ def factorise(
     factor: wp.array(dtype=wp.float64),
     failed: wp.array(dtype=wp.int32),
 ):
-    """The panels of a range of fronts; ``failed`` is the number of a node and one where its pivot is not positive."""
+    """Panels of a range of fronts; ``failed`` is a node's index plus one if its pivot is not positive."""
     factorise_part(first + wp.tid(), fronts, matrix, number, work, factor, failed)
 
 
@@ -313,5 +313,5 @@ def solve(
     # in and out
     x: wp.array(dtype=wp.float64),
 ):
-    """x ← (L Lᵀ)⁻¹ x, in the order of elimination, in a launch of one row."""
+    """x ← (L Lᵀ)⁻¹ x in elimination order, as a launch of one row."""
     solve_all(fronts, factor, scratch, x)

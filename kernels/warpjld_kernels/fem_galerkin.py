@@ -1,8 +1,8 @@
-"""Coarse operator Pᵀ K P of a block matrix, P holding one scalar weight for the three values of a node.
+"""Coarse operator Pᵀ K P of a block matrix, where P has one scalar weight for the three components of a node.
 
-Row by row into a pattern that is known (see ``fem_pattern``): a marker of one integer a coarse node tells where its
-block of the current row is. Each range of rows has its own marker, so ranges may run side by side; sums are in the same
-order whatever the ranges.
+Row by row into a known pattern (see ``fem_pattern``): a marker with one integer per coarse node holds the index of its
+block in the current row. Each range of rows has its own marker, so ranges may be processed in parallel; the order of
+summation does not depend on the ranges.
 """
 
 import warp as wp
@@ -14,7 +14,7 @@ wp.set_module_options(VECTORISED)
 
 @wp.struct
 class Blocks:
-    """Rows of 3×3 blocks: where each begins, columns ascending, nine values a block."""
+    """Rows of 3×3 blocks: start of each row, ascending columns, nine values per block."""
 
     rows: wp.array(dtype=wp.int32)
     columns: wp.array(dtype=wp.int32)

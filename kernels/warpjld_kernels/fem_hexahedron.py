@@ -1,6 +1,6 @@
-"""C++ for the geometry of 8-node elements at 2×2×2 points, put together in ``fem_element``.
+"""C++ code for the geometry of 8-node elements at 2×2×2 points, used in ``fem_element``.
 
-Numbers are ``Doubles``, one lane an element (see ``lanes``).
+Values are ``Doubles``, one lane per element (see ``lanes``).
 """
 
 CORNERS = """
@@ -16,7 +16,7 @@ CORNERS = """
             dn[q][a][2] = 0.125 * side[a][2] * h[0] * h[1];
         }
 """
-"""Defines ``dn[q][a][i]``: derivative of corner a's shape function by local coordinate i at point q."""
+"""Defines ``dn[q][a][i]``: derivative of node a's shape function with respect to local coordinate i at point q."""
 
 GRADIENTS = """
         Doubles g[8][8][3], F[8][3][3], dV[8], dv[8], G[8][3];
@@ -64,9 +64,9 @@ GRADIENTS = """
                 }
         }
 """
-"""Reads ``rest``, ``now`` (places of the corners) and ``large``. Defines
+"""Reads ``rest``, ``now`` (node positions) and ``large``. Defines
 
-- ``g[q][a]``: ∂N_a/∂x at point q, in the present places where strain is large; ``F[q]``: deformation gradients there
-- ``dV[q]``, ``dv[q]``: volumes of the points at rest and now; ``volume``, ``current``: their sums
-- ``G[a]``: Σ_q g_a dv; ``lowest``: least Jacobian determinant
+- ``g[q][a]``: ∂N_a/∂x at point q, in the deformed configuration for large strain; ``F[q]``: deformation gradients there
+- ``dV[q]``, ``dv[q]``: volumes of the points at rest and deformed; ``volume``, ``current``: their sums
+- ``G[a]``: Σ_q g_a dv; ``lowest``: smallest Jacobian determinant
 """

@@ -1,4 +1,4 @@
-"""Signed distance of points to a surface, the sign by winding number: also for surfaces with holes."""
+"""Signed distance of points to a surface, with the sign by winding number, also for surfaces with holes."""
 
 import warp as wp
 
@@ -17,7 +17,7 @@ def signed_distance(
     closest_out: wp.array(dtype=wp.vec3),
     face_out: wp.array(dtype=wp.int32),
 ):
-    """Distance (negative inside), closest point and its face; ``reach`` bounds the search."""
+    """Distance (negative inside), closest point and its face, found within ``reach``."""
     i = wp.tid()
     point = points[i]
     query = wp.mesh_query_point_sign_winding_number(mesh, point, reach)

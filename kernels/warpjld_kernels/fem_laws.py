@@ -1,19 +1,19 @@
-"""C++ for the laws of materials: stress and tangent at a point, put together in ``fem_element``.
+"""C++ code for material laws: stress and tangent at a point, used in ``fem_element``.
 
-A law gives an isochoric Kirchhoff stress τ and its spatial tangent c; the volumetric part is one pressure an element,
-but for ``LINEAR_FULL`` and ``NEO_HOOKE_FULL``. Numbers are ``Doubles``, one lane an element (see ``lanes``).
+A law gives an isochoric Kirchhoff stress τ and its spatial tangent c; the volumetric part is one pressure per element,
+except for ``LINEAR_FULL`` and ``NEO_HOOKE_FULL``. Values are ``Doubles``, one lane per element (see ``lanes``).
 """
 
 LINEAR = 0
-"""Linear elasticity with B-bar. Geometry stays at rest."""
+"""Linear elasticity with B-bar, in the rest configuration."""
 LINEAR_FULL = 1
-"""Linear elasticity with the volumetric part at every point: locks near ν = ½; for comparison."""
+"""Linear elasticity with full integration: locks near ν = ½; for comparison."""
 NEO_HOOKE = 2
 MOONEY_RIVLIN = 3
 FUNG = 4
 """Neo-Hookean with a shear modulus that grows as exp(β (Ī₁ − 3))."""
 NEO_HOOKE_FULL = 5
-"""Neo-Hookean with U(J) at every point: locks as ``LINEAR_FULL`` does."""
+"""Neo-Hookean with U(J) at every point: locks like ``LINEAR_FULL``."""
 
 VOIGT = f"""
     constexpr int LINEAR_FULL = {LINEAR_FULL}, NEO_HOOKE = {NEO_HOOKE}, MOONEY_RIVLIN = {MOONEY_RIVLIN}, FUNG = {FUNG};
@@ -21,7 +21,7 @@ VOIGT = f"""
     const int voigt[6][2] = {{{{0, 0}}, {{1, 1}}, {{2, 2}}, {{0, 1}}, {{1, 2}}, {{2, 0}}}};
     const int at[3][3] = {{{{0, 3, 5}}, {{3, 1, 4}}, {{5, 4, 2}}}};
 """
-"""Defines the laws' numbers, ``voigt[I]`` (row and column of a tensor's I-th component) and its inverse ``at``."""
+"""Defines the laws' indices, ``voigt[I]`` (row and column of a tensor's I-th component) and its inverse ``at``."""
 
 STRESS = """
             Doubles tau[6], D[6][6], total[6];
@@ -105,5 +105,5 @@ STRESS = """
             }
 """
 """Reads the constants ``c10``, ``c01``, ``kappa``, ``beta`` and initial stress ``s0``, ``kind``, ``large``, and at
-point q ``F``, ``dv``, ``dV``. Defines ``tau`` (τ), ``D`` (c) and ``total`` (τ with the initial stress carried along).
+point q ``F``, ``dv``, ``dV``. Defines ``tau`` (τ), ``D`` (c) and ``total`` (τ plus the pushed-forward initial stress).
 """

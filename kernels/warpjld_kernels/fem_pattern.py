@@ -1,7 +1,7 @@
-"""Sparsity patterns: which columns a product of sparse matrices fills, and which block an element adds to.
+"""Sparsity patterns: columns of a product of sparse matrices, and the blocks that elements add to.
 
-Row by row (Gustavson): a marker of one integer a column tells whether the current row has it. Each range of rows has
-its own marker, so ranges may run side by side.
+Row by row (Gustavson): a marker with one integer per column records whether the current row contains it. Each range of
+rows has its own marker, so ranges may be processed in parallel.
 """
 
 import warp as wp
@@ -13,7 +13,7 @@ wp.set_module_options(VECTORISED)
 
 @wp.struct
 class Rows:
-    """A pattern: where each row begins, and its columns."""
+    """A pattern: start of each row, and column indices."""
 
     rows: wp.array(dtype=wp.int32)
     columns: wp.array(dtype=wp.int32)
@@ -76,7 +76,7 @@ def product_pattern(
     # out
     product_out: Rows,
 ):
-    """Without ``fill``: how many columns each row has; with it: which, ascending. ``marker`` must hold −1."""
+    """Without ``fill``: number of columns of each row; with it: the columns, ascending. ``marker`` must be −1."""
     product_rows(begin + wp.tid(), ranges, fill, first, second, third, marker, product_out)
 
 
@@ -90,7 +90,7 @@ def element_slots(
     # out
     slots_out: wp.array2d(dtype=wp.int32),
 ):
-    """Block of the matrix that corner pair (a, b) of an element adds to."""
+    """Index of the matrix block that node pair (a, b) of an element adds to."""
     element = first + wp.tid()
     for a in range(8):
         row = elements[element, a]

@@ -1,4 +1,4 @@
-"""Shape measure of hexahedra and its derivative with respect to their corners."""
+"""Shape measure of hexahedra and its gradient with respect to their nodes."""
 
 import warp as wp
 
@@ -9,8 +9,7 @@ wp.set_module_options(VECTORISED)
 SIZE = 0.05
 """Weight w of an element's size."""
 
-# the corners at the other ends of the three edges from each corner, right-handed: below, one goes round anticlockwise;
-# above, clockwise
+# the other ends of the three edges at each corner, as a right-handed triple
 _ENDS = (
     (1, 2, 3, 0, 7, 4, 5, 6),
     (3, 0, 1, 2, 5, 6, 7, 4),
@@ -19,8 +18,8 @@ _ENDS = (
 
 
 def _gathered() -> str:
-    """C++: each corner's slope from the corners that know it, in ascending order: -(sum) of its own, one edge of each
-    of three others."""
+    """C++ code for each corner's gradient: the sum of its own part and of one part of each of three neighbours, in
+    ascending order."""
     lines = []
     for corner in range(8):
         parts = [(corner, 3)] + [(ends.index(corner), k) for k, ends in enumerate(_ENDS)]
@@ -119,9 +118,9 @@ def measure(
     cost_out: wp.array(dtype=wp.float64),
     slope_out: wp.array2d(dtype=wp.vec3d),
 ):
-    """Σ over corners of (|A|³ / (3√3 χ))² + w (χ − 1/χ)², χ = (d + √(d² + s²)) / 2, d = det A, and its slope.
+    """Σ over corners of (|A|³ / (3√3 χ))² + w (χ − 1/χ)², χ = (d + √(d² + s²)) / 2, d = det A, and its gradient.
 
-    The second term keeps sizes alike; without it shrinking a tangle to a point would cost nothing.
+    The second term keeps sizes similar; without it, shrinking inverted elements to a point would cost nothing.
     """
     measure_element(first + wp.tid(), elements, softness, nodes, cost_out, slope_out)
 
@@ -135,7 +134,7 @@ def gather(
     # out
     slope_out: wp.array(dtype=wp.vec3d),
 ):
-    """Each node's slope: the sum over the corners of elements that lie there, ``corners`` from ``starts`` on."""
+    """Gradient at each node: the sum over incident element corners, listed in ``corners`` from ``starts`` on."""
     node = first + wp.tid()
     total = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     for k in range(starts[node], starts[node + 1]):

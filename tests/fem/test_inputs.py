@@ -77,25 +77,25 @@ def test_two_displacements_for_one_node() -> None:
 
 @pytest.mark.parametrize(
     ("held", "free"),
-    [({}, "moving along x"), ({"x": 0.0}, "moving along y"), ({"x": 0.0, "y": 0.0}, "moving along z")],
+    [({}, "translation along x"), ({"x": 0.0}, "translation along y"), ({"x": 0.0, "y": 0.0}, "translation along z")],
 )
 def test_unconstrained_body(held: dict[str, float], free: str) -> None:
     mesh = box_hexes(counts=(2, 2, 2))
     known = prescribe(mesh, "x-", **held) if held else prescribe(mesh, [0], x=0.0)
-    with pytest.raises(FreeBodyError, match=free if held else "not held"):
+    with pytest.raises(FreeBodyError, match=free if held else "not constrained"):
         solve(Body(mesh, LAW), known)
 
 
 def test_one_of_two_bodies_free() -> None:
     mesh = merge(box_hexes(name="left"), box_hexes(origin=(2, 0, 0), name="right"))
-    with pytest.raises(FreeBodyError, match=r"\(right\) is not held: free in moving along x"):
+    with pytest.raises(FreeBodyError, match=r"\(right\) is not constrained: free are translation along x"):
         solve(Body(mesh, LAW), prescribe(mesh, "left", x=0, y=0, z=0))
 
 
 def test_hinge_is_free_to_turn() -> None:
     mesh = box_hexes(counts=(2, 2, 2))
     edge = np.flatnonzero((mesh.nodes[:, 0] == 0) & (mesh.nodes[:, 1] == 0))
-    with pytest.raises(FreeBodyError, match="turning about"):
+    with pytest.raises(FreeBodyError, match="rotation about"):
         solve(Body(mesh, LAW), prescribe(mesh, edge, x=0, y=0, z=0))
 
 

@@ -24,7 +24,7 @@ def tilted(law: Material, degrees: float) -> float:
 
 
 def test_a_block_of_a_linear_law_tilted_by_30_degrees_is_warned_of() -> None:
-    with pytest.warns(MaterialWarning, match="'body' turns by some (2[5-9]|30)°"):
+    with pytest.warns(MaterialWarning, match="'body' rotates by about (2[5-9]|30)°"):
         assert tilted(LinearElastic(1e6, 0.3), 30.0) != pytest.approx(1.0, rel=0.05)
 
 

@@ -128,7 +128,7 @@ def test_missing_face_and_free_body_are_one_line(tmp_path: Path, capsys: pytest.
     assert "pressure on a missing face set" in capsys.readouterr().err
     path.write_text(SMALL.replace('prescribed = [{ where = "z-", x = 0, y = 0, z = 0 }]', ""))
     assert run(["fem", str(path), "-o", str(tmp_path / "out"), "--no-pictures", "-q"]) == 1
-    assert "is not held: free in moving along x" in capsys.readouterr().err
+    assert "is not constrained: free are translation along x" in capsys.readouterr().err
 
 
 def test_json_is_alone_on_stdout_and_holds_the_reactions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

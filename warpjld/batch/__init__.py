@@ -1,4 +1,4 @@
-"""Many motions on one rig: bound once, clips over processes, a manifest, resumable."""
+"""Batches: many motions on one rig, bound once, processed in parallel, with a manifest, resumable."""
 
 from warpjld.batch.clips import ClipJob, clip_jobs
 from warpjld.batch.deform import Deforming, deform_clip

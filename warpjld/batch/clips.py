@@ -1,4 +1,4 @@
-"""Which clips a batch makes, and what each is called."""
+"""The clips of a batch and their names."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ClipJob:
     """One clip of a batch.
 
     Attributes:
-        name: Unique in the batch whatever the case of letters: the stem of the files made of it.
+        name: Unique in the batch regardless of case: the stem of its output files.
         motion: The motion file.
         animation: Name of the animation in it; None for the first or only one.
     """
@@ -33,18 +33,18 @@ class ClipJob:
 def clip_jobs(motions: Sequence[str | Path], animation: str | None = None) -> list[ClipJob]:
     """Clips of motion files, in their order.
 
-    A clip is called as its file. Files of one name in several folders have their folder's name before it, files
-    that differ only in suffix have the suffix behind it; an animation's name stands behind that of its file.
+    A clip has its file's name. Files of the same name are prefixed by their folder's name, files that differ only in
+    suffix get the suffix appended; an animation's name is appended to that of its file.
 
     Args:
-        motions: Files; a name with ``*``, ``?`` or ``[`` that is no file is a pattern.
-        animation: Name of the animation to take of every file, or ``all``.
+        motions: Files; a name with ``*``, ``?`` or ``[`` that is not a file is a pattern.
+        animation: Name of the animation to use of every file, or ``all``.
 
     Raises:
-        InputError: A pattern that no file fits, a file given twice, or names that cannot be told apart.
+        InputError: A pattern without matches, a file given twice, or names that remain ambiguous.
     """
     files = [file for motion in motions for file in _files(motion)]
-    places = Counter(os.path.realpath(file) for file in files)  # Path.resolve raises at links in a circle
+    places = Counter(os.path.realpath(file) for file in files)  # Path.resolve raises for circular links
     twice = [file for file, count in places.items() if count > 1]
     if twice:
         raise InputError("is given twice", path=twice[0])
@@ -70,7 +70,7 @@ def _files(motion: str | Path) -> list[Path]:
     path = Path(motion)
     if path.exists() or not glob.has_magic(str(motion)):
         return [path]
-    found = sorted(Path(name) for name in glob.glob(str(motion)))  # shells without patterns hand them on
+    found = sorted(Path(name) for name in glob.glob(str(motion)))  # for shells that do not expand patterns
     if not found:
         raise InputError(f"no file fits the pattern '{motion}'")
     return found
@@ -92,7 +92,7 @@ def _names(files: Sequence[Path]) -> list[str]:
 
 
 def _told_apart(names: Sequence[str]) -> list[str]:
-    """Names, with a number behind those that repeat."""
+    """Names, with a number appended to repeated ones."""
     seen: Counter[str] = Counter()
     out = []
     for name in names:
@@ -107,6 +107,6 @@ def _repeated(names: Iterable[str]) -> set[str]:
 
 
 def _safe(name: str) -> str:
-    """A name that every file system takes."""
+    """A name that is valid in every file system."""
     plain = re.sub(r'[\x00-\x1f<>:"/\\|?*]+', "_", name).strip(" .")
     return plain or "clip"

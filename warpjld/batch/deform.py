@@ -1,4 +1,4 @@
-"""One clip on one rig: its motion read, the surface deformed, and everything asked for written."""
+"""Processing of one clip on one rig: read the motion, deform the surface, write all outputs."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
 __all__ = ["ClipFiles", "Deforming", "deform_clip", "frame_span"]
 
-_BLOCK = 16  # frames deformed at once: memory does not grow with the length of the motion
+_BLOCK = 16  # frames deformed at a time: memory does not grow with the length of the motion
 
 
 @dataclass(frozen=True, eq=False)
 class Deforming:
-    """A rig to be moved, and how motions are read and surfaces computed.
+    """A rig and the settings of its deformation.
 
     Attributes:
         rig: The rig.
-        parameters: The covering's; None for the defaults.
-        domains: The covering's; likewise ``method``.
+        parameters: Parameters of the covering; None for the defaults.
+        domains: As of ``bind``; likewise ``method``.
         reading: Keyword arguments of ``load_motion``: rate, limits, side.
-        span: ``A:B``, the frames to make, the motion's first being 0; None for all.
+        span: ``A:B``, first and last frame, counted from 0; None for all.
         device: Warp device.
-        threads: CPU threads; None for as many as pay.
-        touch: Whether skin that crosses is parted: "off", "on", or "limit" to close digits only until they touch.
-        binding: File of a kept binding; None for the cache's.
+        threads: CPU threads; None chooses their number by the work.
+        touch: Whether intersecting skin is separated: "off", "on", or "limit" to close digits only until they touch.
+        binding: File of a stored binding; None for the cache's.
     """
 
     rig: Rig
@@ -49,12 +49,12 @@ class Deforming:
 
     @cached_property
     def covering(self) -> Covering:
-        """The rig's surface, bound when it is first wanted; copies sent to other processes take it along."""
+        """The rig's surface, bound on first access; copies sent to other processes contain it."""
         return self.bound[0]
 
     @cached_property
     def bound(self) -> tuple[Covering, tuple[str, ...]]:
-        """The covering, and what is to be told of how it was come by."""
+        """The covering, and notes on how it was obtained."""
         from warpjld.covering.kept import bind_kept
 
         how = {"parameters": self.parameters, "domains": self.domains, "method": self.method}
@@ -63,13 +63,13 @@ class Deforming:
 
 @dataclass(frozen=True, eq=False)
 class ClipFiles:
-    """What one clip became.
+    """Outputs of one clip.
 
     Attributes:
         files: Files written.
         frames: Number of frames; ``first`` the number of the first.
         moved: The motion on the rig.
-        notes: What whoever opens the files should know.
+        notes: Information for users of the files.
         warnings: What of the motion is not followed or not written, and what looks wrong.
     """
 
@@ -95,15 +95,15 @@ def deform_clip(
     motions: tuple[Path, ...] = (),
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> ClipFiles:
-    """Move a rig by a motion file, and write its surface or the motion of its joints.
+    """Deform a rig by a motion file, and write its surface or the motion of its joints.
 
     Args:
         how: The rig and the settings.
         motion: The motion file.
-        animation: Name of the animation to take of it; None for the first.
-        surfaces: Vertex caches to write; suffixes choose their formats.
-        motions: Files of the motion of the rig's own joints to write, likewise.
-        report: Called with what is being done, how much of it is done, and how much there is.
+        animation: Name of the animation to use; None for the first.
+        surfaces: Vertex caches to write; suffixes determine their formats.
+        motions: Files for the motion of the rig's own joints, likewise.
+        report: Called with the current activity, the amount done, and the total.
 
     Raises:
         InputError: A motion that cannot be read or does not fit the rig, frames it does not have, or a file that
@@ -140,7 +140,7 @@ def deform_clip(
                 for cache in caches:
                     cache.write(parted)
                 report("deforming", start + len(block), len(poses))
-        # here, so that a motion that cannot be written leaves no cache either
+        # inside the block, so that a failure to write a motion leaves no cache
         told = [write_motion(path, rig, poses, rate=moved.rate, start_frame=first) for path in motions]
     return ClipFiles(
         files=(*(file for cache in caches for file in cache.files), *motions),

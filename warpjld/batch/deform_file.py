@@ -1,4 +1,4 @@
-"""One motion file on one rig, by name: what ``warpjld deform`` does, as a function."""
+"""Deformation of a rig by one motion file: the function behind ``warpjld deform``."""
 
 from __future__ import annotations
 
@@ -39,30 +39,30 @@ def deform_file(
     threads: int | None = None,
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> ClipFiles:
-    """Deform a rig by a motion file, and write the surface, frame after frame, or the motion of the rig's joints.
+    """Deform a rig by a motion file, and write the surface of every frame, or the motion of the rig's joints.
 
     Args:
         rig: The rig, or its file.
         motion: BVH, CSV, a file with animations, or a recording of hands (see ``load_motion``).
-        out: Vertex cache to write; the suffix chooses the format (see ``open_cache``).
-        motion_out: Files of the motion of the rig's own joints to write: .bvh, .glb, .usd, .npz.
-        parameters: The covering's; None for the defaults.
-        binding: File of a kept binding, as ``warpjld bind`` writes it.
-        domains: Where a vertex's domain comes from: "geometry", or "skin" for painted weights.
-        method: "smooth", or "paper" for one segment a vertex as published.
-        touch: Whether skin that crosses is parted: "off", "on", or "limit" to close digits only until they touch.
-        animation: Which of the motion file's animations, by name; the first by default.
-        side: Which hand a recording is of, where its file leaves it open.
-        flat_hand_mean: Whether no rotation in MANO poses is the flat hand, where the file does not say.
-        frames: ``A:B``, the frames to make, both included, the motion's first being 0; None for all.
+        out: Vertex cache to write; the suffix determines the format (see ``open_cache``).
+        motion_out: Files for the motion of the rig's own joints: .bvh, .glb, .usd, .npz.
+        parameters: Parameters of the covering; None for the defaults.
+        binding: File of a stored binding, as ``warpjld bind`` writes it.
+        domains: Source of the vertices' domains: "geometry", or "skin" for painted weights.
+        method: "smooth", or "paper" for one segment per vertex as published.
+        touch: Whether intersecting skin is separated: "off", "on", or "limit" to close digits only until they touch.
+        animation: Name of one of the motion file's animations; the first by default.
+        side: Side of a recorded hand, if its file does not state it.
+        flat_hand_mean: Whether zero rotations in MANO poses are the flat hand, if the file does not state it.
+        frames: ``A:B``, first and last frame, counted from 0; None for all.
         rate: Frames a second; None for the motion's own, 30 for CSV.
         limits: CSV angles beyond a joint's limit: "error", "clamp" or "ignore".
         device: Warp device.
-        threads: CPU threads; None for as many as pay.
-        report: Called with what is being done, how much of it is done, and how much there is.
+        threads: CPU threads; None chooses their number by the work.
+        report: Called with the current activity, the amount done, and the total.
 
     Raises:
-        InputError: Nothing to write, or a rig, a motion or a place that cannot be used: no file is left then.
+        InputError: Nothing to write, or an unusable rig, motion or path: no file is left then.
         MissingExtraError: A format needs an optional dependency.
 
     Examples:
@@ -80,7 +80,7 @@ def deform_file(
     motions = tuple(Path(path) for path in motion_out)
     if not (surfaces or motions):
         raise InputError("out, motion_out: want a file to write")
-    for path in surfaces:  # an unknown suffix or a missing library must not cost the work of binding
+    for path in surfaces:  # report unknown suffixes and missing libraries before the work of binding
         check_cache(path)
     for path in motions:
         check_motion_out(path)

@@ -1,4 +1,4 @@
-"""What is kept of a finished clip: how it ended, and the hashes of what it was made of and of what was made."""
+"""Records of finished clips: status, and hashes of inputs and outputs."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from warpjld.io.identity import content_hash
 __all__ = ["FOLDER", "ClipRecord", "read_record", "still_there", "write_record"]
 
 FOLDER = ".clips"
-"""Where records are kept, in the output folder."""
+"""Folder of the records, in the output folder."""
 
 
 @dataclass(frozen=True)
 class ClipRecord:
-    """How a clip ended.
+    """Result of a clip.
 
     Attributes:
-        name: The clip's.
-        motion: The motion file, as it was given.
-        motion_sha256: Its hash, see ``content_hash``; "" where it could not be read.
-        animation: The animation taken of it, or None.
+        name: Name of the clip.
+        motion: Path of the motion file, as given.
+        motion_sha256: Its hash, see ``content_hash``; "" if it could not be read.
+        animation: Name of the animation used, or None.
         status: ``done``, ``failed`` or ``crashed``.
-        message: Why it failed.
-        frames: Frames made.
+        message: Reason of a failure.
+        frames: Number of frames made.
         rate: Frames a second.
-        files: Files made, by name in the output folder, with their hashes.
+        files: Hashes of the files made, by name in the output folder.
         warnings: What of the motion the rig does not follow, and what looks wrong.
-        notes: What else a reader of the result should know.
+        notes: Further information for the user.
     """
 
     name: str
@@ -47,18 +47,18 @@ class ClipRecord:
     notes: list[str] = field(default_factory=list)
 
     def content(self) -> dict[str, Any]:
-        """As plain values."""
+        """The record as plain values, for JSON."""
         return asdict(self)
 
 
 def write_record(out: Path, record: ClipRecord) -> None:
-    """Keep a record in the output folder, whole or not at all."""
+    """Write a record to the output folder, atomically."""
     (out / FOLDER).mkdir(parents=True, exist_ok=True)
     write_json(out / FOLDER / f"{record.name}.json", record.content())
 
 
 def read_record(out: Path, name: str) -> ClipRecord | None:
-    """A clip's record; None where there is none, or none that can be read."""
+    """A clip's record; None if there is none that can be read."""
     try:
         return ClipRecord(**json.loads((out / FOLDER / f"{name}.json").read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
@@ -66,7 +66,7 @@ def read_record(out: Path, name: str) -> ClipRecord | None:
 
 
 def still_there(out: Path, record: ClipRecord) -> bool:
-    """Whether a clip is done and all that it was made of and all that it made are as they were."""
+    """Whether a clip is done, and its inputs and outputs are unchanged."""
     try:
         return (
             record.status == "done"

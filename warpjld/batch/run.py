@@ -1,4 +1,4 @@
-"""Running a batch from start, or from where it was stopped, to its manifest."""
+"""Running of a batch, from the start or from where it was stopped, and its manifest."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from warpjld.runtime.threads import cores
 __all__ = ["BatchResult", "run_batch"]
 
 _MANIFEST = "manifest.json"
-_SETTINGS = ".settings.json"  # no clip is called so
+_SETTINGS = ".settings.json"  # clips never have this name
 _LOCK = ".lock"
 
 
 @dataclass(frozen=True, eq=False)
 class BatchResult:
-    """What a batch left.
+    """Result of a batch.
 
     Attributes:
-        clips: How every clip ended, in the order they were given.
-        manifest: The file that says it all.
-        made: Clips made now; the others were there already.
+        clips: Records of all clips, in the order given.
+        manifest: File with all records and settings.
+        made: Number of clips made in this run; others existed already.
         seconds: Wall-clock time.
     """
 
@@ -45,7 +45,7 @@ class BatchResult:
 
     @property
     def failed(self) -> int:
-        """Clips that could not be made."""
+        """Number of clips that could not be made."""
         return sum(clip.status != "done" for clip in self.clips)
 
 
@@ -62,26 +62,26 @@ def run_batch(
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
     ended: Callable[[ClipRecord], None] = lambda record: None,
 ) -> BatchResult:
-    """Make what is missing of a batch, then write its manifest.
+    """Make the missing clips of a batch, then write its manifest.
 
-    A clip is there already when its record says so and neither its motion file nor a file made of it has changed
-    since. Files and manifest depend on the rig, the motions and the settings only: not on the number of processes,
-    nor on how often the batch was stopped.
+    A clip is not made again if its record says that it is done and neither its motion file nor its output files have
+    changed since. Files and manifest depend on the rig, the motions and the settings only, not on the number of
+    processes, nor on interruptions.
 
     Args:
-        how: The rig, bound, and how motions are read.
+        how: The bound rig and the settings.
         jobs: The clips.
         out: Output folder.
-        formats: Suffixes of the vertex caches to write of every clip.
-        settings: All that determines the files besides the motions, as JSON: settings, hashes of the rig's files.
-        motion_formats: Suffixes of the files of joint motion to write of every clip, as ``<clip>.motion.bvh``.
-        processes: Worker processes; as many as the machine has cores by default.
-        fresh: Forget what ``out`` holds of another batch.
-        report: Called with what is being done, how much is done, and of how much.
-        ended: Called with every clip as it ends.
+        formats: Suffixes of the vertex caches to write for every clip.
+        settings: Everything besides the motions that determines the files, as JSON: settings, hashes of rig files.
+        motion_formats: Suffixes of joint motion files to write for every clip, as ``<clip>.motion.bvh``.
+        processes: Number of worker processes; as many as the machine has cores by default.
+        fresh: Whether to discard the records of another batch in ``out``.
+        report: Called with the current activity, the amount done, and the total.
+        ended: Called with the record of every finished clip.
 
     Raises:
-        InputError: ``out`` holds a batch with other settings, another process makes one there, or it cannot be written.
+        InputError: ``out`` holds a batch with other settings, is in use by another process, or cannot be written.
     """
     began = time.perf_counter()
     _make(out)
@@ -105,7 +105,7 @@ def _made(
     report: Callable[[str, int, int], None],
     ended: Callable[[ClipRecord], None],
 ) -> tuple[list[ClipRecord], int]:
-    """Make what is missing; records of all clips, and how many were made now."""
+    """Make the missing clips; returns the records of all clips, and the number of clips made now."""
     waiting = [job for job in jobs if (kept := read_record(out, job.name)) is None or not _same(out, job, kept)]
     for job in waiting:
         _forget(out, job)
@@ -123,7 +123,7 @@ def _made(
     if waiting:
         if formats:
             report("binding", count, len(jobs))
-            _ = how.covering.runs  # bound and packed once here, not once in every worker
+            _ = how.covering.runs  # bind once here, not in every worker
         workers = min(processes or cores(), len(waiting))
         run_jobs(BatchWork(how, out, formats, motion_formats), waiting, processes=workers, done=done)
     return [record for job in jobs if (record := read_record(out, job.name)) is not None], len(waiting)
@@ -143,7 +143,7 @@ def _make(out: Path) -> None:
 
 
 def _open(out: Path, settings: dict[str, Any], fresh: bool) -> None:
-    """Make sure that what the folder holds was made with these settings."""
+    """Check that the content of the folder was made with these settings."""
     known = out / FOLDER / _SETTINGS
     try:
         for record in (out / FOLDER).glob("*.json") if fresh else ():

@@ -1,4 +1,4 @@
-"""What a worker of a batch does: one clip at a time, recorded as soon as its files are whole."""
+"""Work of a batch's worker process: one clip at a time, recorded when its files are complete."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["BatchWork"]
 
 @dataclass(frozen=True, eq=False)
 class BatchWork:
-    """Clips on a bound rig, written into a folder.
+    """Clips of a bound rig, written into a folder.
 
     Attributes:
         how: The rig and the settings.
         out: The output folder.
-        formats: Suffixes of the vertex caches to write of every clip.
-        motion_formats: Suffixes of the files of joint motion to write of every clip.
+        formats: Suffixes of the vertex caches to write for every clip.
+        motion_formats: Suffixes of joint motion files to write for every clip.
     """
 
     how: Deforming
@@ -33,13 +33,13 @@ class BatchWork:
     motion_formats: tuple[str, ...] = ()
 
     def begin(self) -> None:
-        """Keep Warp's remarks off the output of many workers."""
+        """Suppress Warp's messages in the output of workers."""
         from warpjld.runtime.quiet import silence_warp
 
         silence_warp()
 
     def do(self, job: ClipJob) -> str:
-        """Make a clip; returns its status. What goes wrong with one clip is no reason to end the others."""
+        """Make a clip; returns its status. Errors are recorded and do not affect other clips."""
         hashed = ""
         try:
             hashed = content_hash(job.motion)
@@ -74,12 +74,12 @@ class BatchWork:
         return record.status
 
     def kept(self, job: ClipJob) -> str | None:
-        """Status of a clip that was made in this run already."""
+        """Status of a clip that was made in this run already, else None."""
         record = read_record(self.out, job.name)
         return None if record is None else record.status
 
     def bury(self, job: ClipJob) -> str:
-        """Record that a clip ended its process."""
+        """Record that a clip crashed its process; returns its status."""
         write_record(self.out, self._failed(job, "", f"{job.motion}: the clip ended its process", "crashed"))
         return "crashed"
 

@@ -1,4 +1,4 @@
-"""Finite elements: hexahedral meshes, materials, loads, and solvers that say how they ended (B §3, R91–R107).
+"""Finite elements: hexahedral meshes, materials, loads, and solvers with an explicit status (B §3, R91–R107).
 
 Examples:
     >>> mesh = wj.fem.box_hexes((0.1, 0.02, 0.02), (10, 2, 2))  # m, elements

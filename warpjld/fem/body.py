@@ -1,4 +1,4 @@
-"""A body: mesh and materials, and their stiffness and forces at a displacement."""
+"""A discretised body: mesh and materials, assembled to stiffness and internal forces at a displacement."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ __all__ = ["Body", "Tangent"]
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """Stiffness and internal forces at a displacement.
+    """Tangent stiffness and internal forces at a displacement.
 
     Attributes:
-        stiffness: Tangent K, or None where only forces were asked for.
-        forces: Internal forces, initial stresses included [N], shape (3N,).
-        lowest: Lowest Jacobian determinant of each element [m³/8], shape (E,); ≤ 0 where it is turned inside out.
-        pressures: κ (θ − 1) of each element [Pa], or what it would be after the increment, to first order, shape (E,).
+        stiffness: Tangent stiffness K, or None if only forces were requested.
+        forces: Internal forces, including initial stresses [N], shape (3N,).
+        lowest: Smallest Jacobian determinant of each element [m³/8], shape (E,); ≤ 0 for inverted elements.
+        pressures: κ (θ − 1) of each element [Pa], shape (E,); extrapolated to first order to the end of an increment
+            if one was given.
     """
 
     stiffness: BlockMatrix | None
@@ -38,14 +39,14 @@ class Tangent:
 
 
 class Body:
-    """One or several meshed bodies with their laws; the pattern is found once and reused (B eqs. 2–5, R101–R103).
+    """One or several meshed bodies with their material laws; the sparsity pattern is reused (B eqs. 2–5, R101–R103).
 
     Args:
-        mesh: The mesh; elements must not be inside out.
+        mesh: The mesh, without inverted elements.
         materials: One law, or one per region name.
-        initial_stress: Stress at rest [Pa], xx yy zz xy yz zx, shape (6,) or (E, 6) (R98). Second Piola–Kirchhoff
-            where the law is for large strain.
-        threads: Threads for assembly and products, by default all.
+        initial_stress: Stress at rest [Pa], xx yy zz xy yz zx, shape (6,) or (E, 6) (R98). Second Piola–Kirchhoff for
+            large-strain laws.
+        threads: Threads for assembly and products; all by default.
 
     Raises:
         InputError: Inverted elements, a region without a law, or wrong shapes.
@@ -78,12 +79,12 @@ class Body:
 
     @property
     def large_strain(self) -> bool:
-        """Whether any law needs Newton's method."""
+        """Whether any law is for large strain, which needs Newton's method."""
         return bool((self.kinds >= NEO_HOOKE).any())
 
     @property
     def poisson(self) -> float:
-        """Highest Poisson's ratio of any element at small strain."""
+        """Largest small-strain Poisson's ratio of all elements."""
         bulk, shear = self.constants[:, 2], 2.0 * self.constants[:, :2].sum(axis=1)
         return float(((3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)).max())
 
@@ -105,10 +106,10 @@ class Body:
 
         Args:
             displacement: [m], shape (3N,) or (N, 3); at rest by default.
-            stiffness: Whether K is wanted, or forces only.
-            pressures: Pressure of each element that K is to take for its own, shape (E,); by default the present one.
-            increment: Displacement that is about to be added [m], shape (3N,): ``pressures`` of the result foresee it.
-            reuse: A result that is not needed any more: its matrix is written over.
+            stiffness: Whether to assemble K, or forces only.
+            pressures: Pressure of each element to use in K, shape (E,); that at the displacement by default.
+            increment: Displacement about to be added [m], shape (3N,), for extrapolated ``pressures`` of the result.
+            reuse: A result that is no longer needed, whose matrix is overwritten.
 
         Raises:
             InputError: Wrong shapes.
@@ -138,7 +139,7 @@ class Body:
         return Tangent(matrix, forces, lowest, found)
 
     def _arguments(self) -> tuple[Any, Any]:
-        """Of the kernel: elements in batches, and the mesh with its laws."""
+        """Kernel arguments: elements in batches, and the mesh with its laws."""
         from warpjld_kernels import fem_element
 
         b, model = self._batches, fem_element.Model
@@ -162,5 +163,5 @@ class Body:
             raise InputError(
                 f"mesh: {count} of {len(lowest)} elements have a negative Jacobian, the worst is element {worst} "
                 f"({lowest[worst]:.3g} m³/8) in region '{self.mesh.region_names[self.mesh.regions[worst]]}': "
-                "corners out of order, or the element is turned inside out"
+                "nodes in the wrong order, or the element is inverted"
             )

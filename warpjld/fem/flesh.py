@@ -1,4 +1,4 @@
-"""Flesh between skin and bones: a rig's surface meshed, with bones along its segments (B §3.3 Fig. 7, R105, R110)."""
+"""Volume mesh of a rig's flesh, with bones along the skeleton's segments (B §3.3 Fig. 7, R105, R110)."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ __all__ = ["Flesh", "flesh_of"]
 
 @dataclass(frozen=True, eq=False)
 class Flesh:
-    """A rig's volume.
+    """Volume mesh of a rig's flesh and bones.
 
     Attributes:
         mesh: Regions ``flesh`` and ``bone``; each bone's nodes are a set named ``bone.`` and the joint at its far end.
-        bones: Far joint of each bone, in the skeleton's numbering.
-        parents: Near joint of each bone, itself for the piece behind a root.
+        bones: Distal joint of each bone, as an index of the skeleton.
+        parents: Proximal joint of each bone; the same joint for the piece behind a root.
         names: Name of each bone's node set.
-        shafts: Their shapes.
-        skin: The rig's own surface, carried by the mesh.
-        fit: Quality of the mesh.
+        shafts: Shape of each bone.
+        skin: The rig's surface, embedded in the mesh.
+        fit: Mesh with quality measures.
         rest: Rest positions of the joints [m], shape (J, 3).
     """
 
@@ -46,7 +46,7 @@ class Flesh:
     rest: Array
 
     def held(self, poses: Poses | None = None, frame: int = 0) -> Prescribed:
-        """Bones prescribed: at rest, or moved by a pose of the skeleton (R110)."""
+        """Prescribed displacements of all bones: zero, or moved by a pose of the skeleton (R110)."""
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
         for name, parent in zip(self.names, self.parents, strict=True):
             nodes = self.mesh.node_sets[name]
@@ -72,21 +72,21 @@ def flesh_of(
 ) -> Flesh:
     """Mesh the inside of a rig's surface and mark its bones.
 
-    A bone follows a segment. Its radius is a share of the depth of the flesh, and it lies towards the back of the hand
-    (the side of the normal, segment direction × flexion axis, R20), where real bones are close under the skin (R105).
+    A bone follows a segment. Its radius is a share of the depth of the flesh, and it is shifted towards the back of the
+    hand (the direction of the normal, segment × flexion axis, R20), where bones lie close under the skin (R105).
 
     Args:
         rig: Surface and skeleton.
         spacing: Edge length of the elements [m].
-        bone: Radius of a bone over the depth of its segment under the skin.
-        flush: Shift towards the back over that depth; bone + flush = 1 makes it touch the skin.
-        gap: Part of a segment that is left soft at either end, so that joints can move.
-        head: The same at the far end where another segment follows, by default ``gap``; small, so that the bone's head
-            makes the knuckle as it does in a real hand.
-        least: Least scaled Jacobian.
+        bone: Radius of a bone, per depth of its segment under the skin.
+        flush: Shift towards the back, per that depth; with bone + flush = 1 the bone touches the skin.
+        gap: Share of a segment at either end that is left soft, so that joints can move.
+        head: Likewise at the distal end where another segment follows, ``gap`` by default; small, so that the head of
+            the bone forms the knuckle.
+        least: Smallest scaled Jacobian.
 
     Raises:
-        InputError: Shares that make no bone, a surface that cannot be meshed, or no bone at this spacing.
+        InputError: Shares that give no bone, a surface that cannot be meshed, or no bone at this spacing.
     """
     far = gap if head is None else head
     if not 0 < bone < 1 or not 0 <= flush < 1 or not 0 <= gap < 0.5 or not 0 <= far < 0.5:
@@ -121,14 +121,14 @@ def _skin(mesh: HexMesh, rig: Rig, spacing: float) -> Embedding:
 
 
 def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float, head: float) -> dict[int, Bone]:
-    """The shape of every bone by the joint at its far end; shares as in ``flesh_of``."""
+    """Shape of every bone, by its distal joint; arguments as in ``flesh_of``."""
     skeleton = rig.skeleton
     shafts: dict[int, Bone] = {}
     for joint, parent in enumerate(skeleton.parents):
         if parent < 0:
-            # what lies behind the root (the forearm's stump) is held with it
+            # the piece behind the root (the stump of the forearm) is held with it
             parent, start = joint, skeleton.rest[joint]
-            along = _backwards(rig, envelope, joint)
+            along = _behind_root(rig, envelope, joint)
         else:
             start = skeleton.rest[parent]
             along = skeleton.rest[joint] - start
@@ -145,8 +145,8 @@ def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float,
     return shafts
 
 
-def _backwards(rig: Rig, envelope: Envelope, root: int) -> Array:
-    """From a root joint away from its children, as far as the surface goes [m]."""
+def _behind_root(rig: Rig, envelope: Envelope, root: int) -> Array:
+    """Vector from a root joint away from its children, to the end of the surface [m]."""
     skeleton = rig.skeleton
     children = skeleton.rest[np.asarray(skeleton.parents) == root] - skeleton.rest[root]
     away = -children.mean(axis=0) if len(children) else np.zeros(3)
@@ -161,26 +161,26 @@ def _backwards(rig: Rig, envelope: Envelope, root: int) -> Array:
 
 
 def _owner(mesh: HexMesh, shafts: dict[int, Bone], parents: Ints32, *, jointed: bool) -> Ints:
-    """Bone of every element by the joint at its far end, -1 in flesh.
+    """Bone of every element, as its distal joint; -1 in flesh.
 
-    In thin fingers of large elements a bone that is covered by flesh may have no element left: it may then reach the
-    skin.
+    In thin fingers with large elements, a bone that is covered by flesh may contain no element: it may then extend to
+    the skin.
     """
     ends = np.array(list(shafts))
     bare: list[int] = []
     for _ in range(2):
         owner = claimed(mesh, list(shafts.values()), bare)
-        owner = _apart(mesh, np.where(owner >= 0, ends[owner], -1))
+        owner = _separate_bones(mesh, np.where(owner >= 0, ends[owner], -1))
         if jointed:
-            owner = _jointed(mesh, owner, parents)
+            owner = _separate_at_joints(mesh, owner, parents)
         bare = np.flatnonzero(~np.isin(ends, owner)).tolist()
         if not bare:
             break
     return owner
 
 
-def _jointed(mesh: HexMesh, owner: Ints, parents: Ints32) -> Ints:
-    """At least two elements of flesh between bones that meet at a joint: one would have to bear its whole motion."""
+def _separate_at_joints(mesh: HexMesh, owner: Ints, parents: Ints32) -> Ints:
+    """Keep at least two elements of flesh between bones at a joint: one would have to bear the whole motion."""
     owner = owner.copy()
     for joint, parent in enumerate(parents):
         if parent < 0 or not (owner == joint).any() or not (owner == parent).any():
@@ -197,8 +197,9 @@ def _jointed(mesh: HexMesh, owner: Ints, parents: Ints32) -> Ints:
     return owner
 
 
-def _apart(mesh: HexMesh, owner: Ints) -> Ints:
-    """No node in two bones: where they meet, elements of the later one turn to flesh."""
+def _separate_bones(mesh: HexMesh, owner: Ints) -> Ints:
+    """Assign each node to one bone at most: where bones touch, elements of the one with the larger index become
+    flesh."""
     owner = owner.copy()
     first = np.full(len(mesh.nodes), np.iinfo(np.int64).max)
     bony = owner >= 0

@@ -1,4 +1,4 @@
-"""Kernel launches over rows that threads share."""
+"""Launches of CPU kernels over rows, distributed over threads."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from warpjld.runtime.threads import cores, helpers
 __all__ = ["Launch", "grouped", "on_rows", "shared", "threads_of"]
 
 _LEAST_ROWS = 3000
-"""Rows below which handing a part to another thread costs more than it saves."""
+"""Number of rows below which distribution over threads costs more than it saves."""
 
 
 def threads_of(threads: int | None = None) -> int:
-    """As many threads as asked for, by default as this process may use."""
+    """The given number of threads; by default as many as this process may use."""
     return cores() if threads is None else max(1, threads)
 
 
 def shared(values: NDArray[Any]) -> Any:
-    """A Warp array over the memory of a contiguous NumPy array.
+    """A Warp array that shares the memory of a contiguous NumPy array.
 
     Raises:
         ValueError: The array is not contiguous.
@@ -36,7 +36,7 @@ def shared(values: NDArray[Any]) -> Any:
 
 
 def grouped(kind: Any, **arrays: NDArray[Any]) -> Any:
-    """A struct of a kernel whose members are Warp arrays over the memory of NumPy arrays, made contiguous first."""
+    """A Warp struct whose arrays share the memory of NumPy arrays; non-contiguous ones are copied first."""
     group = kind()
     for name, values in arrays.items():
         setattr(group, name, shared(np.ascontiguousarray(values)))
@@ -44,14 +44,14 @@ def grouped(kind: Any, **arrays: NDArray[Any]) -> Any:
 
 
 class Launch:
-    """A kernel over rows with its arguments, recorded once and run many times.
+    """A kernel over rows with its arguments, recorded once to be run many times.
 
     Args:
-        kernel: Takes its first row as first argument.
-        count: Rows.
+        kernel: Kernel with its first row as first argument.
+        count: Number of rows.
         inputs: Further arguments; arrays are kept alive.
-        threads: Threads to share the rows between; every row gives the same bits however they are shared.
-        least: Rows below which one thread does all.
+        threads: Threads to distribute the rows over; results of rows must not depend on it.
+        least: Number of rows below which a single thread is used.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Launch:
         ]
 
     def __call__(self) -> None:
-        """Run it, and return when all rows are done."""
+        """Run the kernel; returns when all rows are done."""
         others = [helpers(self._threads).submit(command.launch) for command in self._commands[1:]]
         for command in self._commands[:1]:
             command.launch()

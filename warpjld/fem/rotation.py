@@ -1,4 +1,4 @@
-"""Rotations that Hooke's law at small strain takes for strain."""
+"""Warning about rotations, which Hooke's law at small strain treats as strain."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from warpjld.fem.mesh.shape import CENTRE_GRADIENT
 __all__ = ["warn_of_rotation"]
 
 _MOST = 0.15
-"""Rotation that is said nothing of [rad]: strains of 1 − cos = 1 % come of it alone."""
+"""Largest rotation without a warning [rad]: it causes spurious strains of 1 − cos = 1 %."""
 _SHARE = 0.9
-"""Share of a region's volume that turns by less than what is said."""
+"""Share of a region's volume that has to rotate by more than that for a warning."""
 
 
 def warn_of_rotation(body: Body, displacement: Array) -> None:
-    """Warn of regions of a linear law that turn as a whole, or nearly: a block tilted by 30° swells by a third.
+    """Warn of regions with a linear law that rotate nearly as a whole: a block rotated by 30° would grow by a third.
 
-    The rotation of an element is the size of (∇u − ∇uᵀ) / 2, the sine of the angle where it only turns.
+    The rotation of an element is the norm of (∇u − ∇uᵀ) / 2, the sine of the angle for a rigid rotation.
 
     Args:
         body: Mesh and laws.
@@ -45,8 +45,8 @@ def warn_of_rotation(body: Body, displacement: Array) -> None:
         if least > _MOST:
             angle = np.degrees(np.arcsin(min(least, 1.0)))
             warnings.warn(
-                f"'{body.mesh.region_names[number]}' turns by some {angle:.0f}°, which its linear law takes for "
-                "strain: sizes and forces are wrong; want a law for large strain (NeoHooke)",
+                f"'{body.mesh.region_names[number]}' rotates by about {angle:.0f}°, which its linear law treats "
+                "as strain: dimensions and forces are wrong; use a large-strain law (NeoHooke)",
                 MaterialWarning,
                 stacklevel=3,
             )

@@ -1,4 +1,4 @@
-"""Reading rigs and motions, writing caches."""
+"""Readers of rigs and meshes, writers of vertex caches."""
 
 from warpjld.io.rig_file import load_rig
 

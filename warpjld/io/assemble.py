@@ -1,4 +1,4 @@
-"""A rig file's raw content → :class:`~warpjld.rig.Rig`: units, recognition, completion, axes, weights."""
+"""Assembly of a rig from a file's raw content: units, recognition, completion, axes, weights."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from warpjld.skeleton.recognise.recognise import recognise
 
 __all__ = ["assemble_rig"]
 
-_SAME_PLACE = 1e-3  # of the skeleton's size
-_NO_WEIGHT = 1e-6  # sum of painted weights below which a vertex has none
+_SAME_PLACE = 1e-3  # distance at which joints coincide, per size of the skeleton
+_NO_WEIGHT = 1e-6  # sum of painted weights up to which a vertex counts as unweighted
 
 
 def assemble_rig(
@@ -38,12 +38,12 @@ def assemble_rig(
     up: str | None = None,
     joint_map: Mapping[str, Any] | None = None,
 ) -> Rig:
-    """Recognise what ``source`` holds and bring it to the canonical form; arguments as in ``load_rig``.
+    """Recognise the content of ``source`` and convert it to the canonical form; arguments as in ``load_rig``.
 
-    ``joint_map`` is what such a file holds.
+    ``joint_map`` is the content of a joint map file.
 
     Raises:
-        InputError: What it holds cannot be used; the file is named.
+        InputError: The content cannot be used; names the file.
     """
     try:
         return _assemble(source, side, unit, scale, up, joint_map)
@@ -104,7 +104,7 @@ def _assemble(
         skin, bare = _skin(source.joints, source.weights, found.owner, len(found.skeleton), surface)
     rigid, rigid_notes = rigid_parts(surface, found.skeleton, skin, _rigid(source, found.owner, surface))
     return Rig(
-        name=source.path.stem.encode("utf-8", "replace").decode(),  # files may be called by bytes that are no text
+        name=source.path.stem.encode("utf-8", "replace").decode(),  # file names may be no valid text
         skeleton=skeleton,
         surface=surface,
         skin=skin,
@@ -120,10 +120,10 @@ def _assemble(
 
 
 def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
-    """Joint of the skeleton that each joint of the file moves with.
+    """Joint of the skeleton that each joint of the file moves with, shape (N,).
 
-    -1 for bare ones above all of them, unless they share the place of one, or legs and spine part at them: such a root
-    is a pelvis.
+    -1 for joints above all recognised ones that own no skin, unless they coincide with a recognised joint, or legs and
+    spine branch off there: such a root is a pelvis.
     """
     tree = source.tree
     carries = np.zeros(len(tree), dtype=bool)
@@ -141,7 +141,7 @@ def _movers(source: SourceRig, found: Canonical) -> NDArray[np.int64]:
 
 
 def _stated(source: SourceRig, by_hand: Mapping[str, Any]) -> dict[str, Any]:
-    """Joints that are stated: by hand, and for the rest by the file itself, as VRM does."""
+    """Stated joints: those of the joint map, and others that the file itself states, as VRM does."""
     taken = {*by_hand.get("ignore", ()), *(name for name in by_hand.values() if isinstance(name, str))}
     own = {name: joint for name, joint in source.stated_names().items() if joint not in taken}
     return own | dict(by_hand)
@@ -150,10 +150,10 @@ def _stated(source: SourceRig, by_hand: Mapping[str, Any]) -> dict[str, Any]:
 def _skin(
     joints: NDArray[np.int64], weights: NDArray[np.float64], owner: NDArray[np.int64], count: int, surface: Surface
 ) -> tuple[Skin | None, int]:
-    """Painted weights over welded vertices and canonical joints, and how many vertices had none.
+    """Painted weights over welded vertices and canonical joints, and the number of unweighted vertices.
 
-    Vertices welded into one share their mean; those without weight take their neighbours'. None where no vertex has
-    any.
+    Vertices that are welded into one get the mean; unweighted ones get those of their neighbours. None where no vertex
+    has any weight.
     """
     dense = np.zeros((len(surface.vertices), count))
     np.add.at(dense, (surface.weld[:, None], owner[joints]), weights)
@@ -177,14 +177,14 @@ def _bare(count: int, skin: Skin | None) -> tuple[str, ...]:
 
 
 def _joined(surface: Surface) -> tuple[str, ...]:
-    """What is said of meshes whose borders are one."""
+    """Note on meshes that were joined at common borders."""
     own = sum(len(np.unique(surface.weld[part.vertices])) for part in surface.parts)
     shared = own - len(surface.vertices)
     return (f"meshes joined where their borders coincide, at {shared} vertices",) if shared > 0 else ()
 
 
 def _rigid(source: SourceRig, owner: NDArray[np.int64], surface: Surface) -> NDArray[np.int32] | None:
-    """Rigid parts over welded vertices and canonical joints."""
+    """Joint that each welded vertex follows rigidly, -1 for others; None if there is none."""
     if source.rigid is None or not (source.rigid >= 0).any():
         return None
     out = np.full(len(surface.vertices), -1, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""What a rig or motion file is: a hash of its bytes, and of the files that belong to it."""
+"""Hash of the content of a rig or motion file, including files it refers to."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _USD = (".usd", ".usda", ".usdc")
 
 
 def content_hash(path: Path) -> str:
-    """SHA-256 of a file; where others belong to it, of the hashes of all.
+    """SHA-256 of a file; if it refers to others, of the hashes of all.
 
     Raises:
-        OSError: The file itself cannot be read; others that cannot are what they are: missing.
+        OSError: The file itself cannot be read; others that cannot be read count as missing.
     """
     own = file_hash(path)
     others = files_of(path)
@@ -28,10 +28,10 @@ def content_hash(path: Path) -> str:
 
 
 def files_of(path: Path) -> list[Path]:
-    """Files that hold a part of a file's rig or motion: the buffers of a .gltf, the layers of a USD stage.
+    """Files that contain part of a file's rig or motion: the buffers of a .gltf, the layers of a USD stage.
 
-    Textures are none: nothing that is made depends on them. What cannot be understood refers to nothing: whoever
-    reads it says so.
+    Textures are not included, since results do not depend on them. Invalid files give an empty list; their reader
+    reports the error.
     """
     suffix = path.suffix.lower()
     if suffix == ".gltf":

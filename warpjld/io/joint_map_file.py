@@ -1,4 +1,4 @@
-"""Joint maps: which joint of a file is which, stated by hand where recognition errs or doubts, as JSON.
+"""Joint map files (JSON): user-stated pairs of canonical joint and file joint, where recognition errs or is unsure.
 
 ::
 
@@ -10,9 +10,9 @@
     }
 
 Keys are canonical joints, values the file's own names (``name#2`` is the second of that name); null: the file has no
-such joint. ``ignore`` lists joints of the file that are to be no joints of their own: their flesh follows the joint
-above. What is not stated is recognised as ever; what is stated wins over everything. ``warpjld inspect RIG --write-map
-map.json`` writes what was recognised, for editing.
+such joint. ``ignore`` lists joints of the file that are not to be kept as joints: their flesh follows the joint above.
+Joints that are not stated are recognised as usual; stated ones override everything. ``warpjld inspect RIG --write-map
+map.json`` writes the recognised joints, for editing.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ __all__ = ["read_joint_map", "write_joint_map"]
 
 
 def read_joint_map(path: str | Path) -> dict[str, Any]:
-    """What a joint map states; whether a file has those joints is checked when that is loaded.
+    """Content of a joint map; whether the rig file has those joints is checked when it is loaded.
 
     Raises:
-        InputError: It cannot be read, or is no joint map.
+        InputError: The file cannot be read, or is not a joint map.
     """
     content = read_json(path)
     if not isinstance(content, dict):
@@ -47,10 +47,10 @@ def read_joint_map(path: str | Path) -> dict[str, Any]:
 
 
 def write_joint_map(path: str | Path, rig: Rig) -> None:
-    """Write which joint of its file each recognised joint of a rig is, null for those that were added.
+    """Write the joint map of a rig as recognised, with null for added joints.
 
     Raises:
-        InputError: The rig has no joints of a file, or the map cannot be written.
+        InputError: The rig is not from a file, or the map cannot be written.
     """
     tree = rig.source
     if tree is None:

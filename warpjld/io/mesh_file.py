@@ -1,4 +1,4 @@
-"""Surfaces without joints: OBJ, PLY, OFF and glTF, and STL and other kinds that trimesh reads."""
+"""Reader of surfaces without joints: OBJ, PLY, OFF and glTF; STL and other formats by trimesh."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class MeshFile:
         vertices: Positions, shape (W, 3).
         faces: Triangles, shape (S, 3); larger polygons are split.
         uv: Texture coordinates, shape (W, 2), or None.
-        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), instead of ``uv`` where some vertex
-            has several.
+        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), instead of ``uv`` if a vertex has
+            several.
         parts: The file's meshes.
-        notes: What was mended on the way.
-        polygons: Polygon that each triangle is a part of, shape (S,), in the file's order; None where all are
+        notes: Repairs, for the user.
+        polygons: Polygon of the file that each triangle is part of, shape (S,); None if all polygons are
             triangles.
     """
 
@@ -52,10 +52,10 @@ class MeshFile:
 
 
 def read_mesh(path: str | Path) -> MeshFile:
-    """Read all triangle meshes of a file, placed as its scene says.
+    """Read all triangle meshes of a file, placed by its scene graph.
 
     Raises:
-        InputError: Unreadable, of an unknown kind, without triangles, or not finite.
+        InputError: Unreadable, of an unknown format, without triangles, or not finite.
     """
     path = Path(path)
     kind = path.suffix.lower()
@@ -92,7 +92,7 @@ def _by_trimesh(path: Path) -> MeshFile:
         raise InputError(f"{kind.upper()} files need packages that trimesh reads them with: save as STL, OBJ or PLY")
     if kind == "3mf":
         check_archive(path)
-    # not load_scene, which trimesh 4.5 has not yet
+    # not load_scene, which trimesh 4.5 does not have yet
     loaded = trimesh.load(path, process=False, force="scene")
     scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene(loaded)
     vertices, faces, uvs, parts = [], [], [], []
@@ -104,7 +104,7 @@ def _by_trimesh(path: Path) -> MeshFile:
             continue
         check_limit("vertices", points + len(mesh.vertices), path=path)
         vertices.append(mesh.vertices @ transform[:3, :3].T + transform[:3, 3])
-        turned = np.linalg.det(transform[:3, :3]) < 0  # a mirrored node turns its triangles inside out
+        turned = np.linalg.det(transform[:3, :3]) < 0  # a mirroring node inverts its triangles
         faces.append((mesh.faces[:, ::-1] if turned else mesh.faces) + points)
         uvs.append(getattr(mesh.visual, "uv", None))
         ends = points + len(mesh.vertices), triangles + len(mesh.faces)
@@ -152,7 +152,7 @@ _READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".vrm": _gltf,
 }
 _BY_TRIMESH = (".stl", ".stl_ascii", ".3mf", ".dae", ".vtk", ".vtu", ".msh", ".mesh", ".inp", ".nas", ".bdf")
-"""Of trimesh's kinds those that hold surfaces: its readers of archives and drawings open whatever these name."""
+"""trimesh's surface formats; its readers of archives and drawings are excluded, as these open any file named inside."""
 
 
 def _check_finite(vertices: NDArray[np.float64], path: Path) -> None:

@@ -1,8 +1,8 @@
-"""Wavefront OBJ as it stands in the file: every ``v`` line is a vertex, in the file's order.
+"""Reader of Wavefront OBJ that keeps every ``v`` line as a vertex, in the file's order.
 
-Own parser, since those of the libraries tried change what is exported in the file's order or err in silence: trimesh
-and VTK split vertices where texture coordinates or materials meet, tinyobjloader 2.0 loses the first vertex of a file
-with a byte order mark and refuses a comment behind a face.
+Own parser, since libraries change the vertex order, which exports must keep, or fail silently: trimesh and VTK split
+vertices at texture or material seams, tinyobjloader 2.0 loses the first vertex of a file with a byte order mark and
+rejects comments after a face.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ __all__ = ["ObjFile", "read_obj"]
 
 
 _GO_ON = ("v", "vt", "f", "fo")
-"""Lines that a backslash continues; in comments and names it is part of a Windows path."""
+"""Keywords of lines that a backslash continues; in comments and names it may belong to a Windows path."""
 
-_MOST = 2**31  # indices: more than any file that can be read holds
+_MOST = 2**31  # limit of indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +33,12 @@ class ObjFile:
     """The triangles of an OBJ file.
 
     Attributes:
-        vertices: Position of every ``v`` line, also of those that no face uses, shape (W, 3).
-        faces: Triangles, shape (S, 3); larger polygons are split, also concave ones.
+        vertices: Position of every ``v`` line, including unused ones, shape (W, 3).
+        faces: Triangles, shape (S, 3); larger polygons, also concave ones, are split.
         corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), or None.
-        parts: The file's objects (``o``) where each has a run of vertices of its own, else the file as a whole.
-        notes: What was mended.
-        polygons: Face of the file that each triangle is a part of, counted from 0, shape (S,).
+        parts: The file's objects (``o``) if each has a contiguous range of vertices, else the file as a whole.
+        notes: Repairs, for the user.
+        polygons: Face of the file that each triangle is part of, counted from 0, shape (S,).
     """
 
     vertices: NDArray[np.float64]
@@ -51,7 +51,7 @@ class ObjFile:
 
 @dataclass
 class _Lines:
-    """What the lines of a file say; ``lines`` of vertices, texture coordinates and faces are numbered from one."""
+    """Tokens of the file's lines; line numbers of vertices, texture coordinates and faces count from one."""
 
     vertices: list[list[str]] = field(default_factory=list)
     vertex_lines: list[int] = field(default_factory=list)
@@ -65,14 +65,13 @@ class _Lines:
 
 
 def read_obj(path: str | Path) -> ObjFile:
-    """Read the polygons of an OBJ file; lines, curves, normals and materials are left out.
+    """Read the polygons of an OBJ file; lines, curves, normals and materials are ignored.
 
-    Numbers may stand apart by blanks or tabs, lines may go on behind a backslash, comments may follow anything, and
-    the file may begin with a byte order mark. Indices count from one, negative ones backwards from the last vertex
-    so far.
+    Numbers may be separated by blanks or tabs, a backslash continues lines, comments may follow anything, and the file
+    may start with a byte order mark. Indices count from one, negative ones backwards from the last vertex so far.
 
     Raises:
-        InputError: It cannot be read, a line is not as OBJ has it, or there are no faces.
+        InputError: It cannot be read, a line is invalid, or there are no faces.
     """
     path = Path(path)
     lines = _split(read_text(path, errors="replace"), path)  # names may be in any encoding
@@ -112,7 +111,7 @@ def _split(text: str, path: Path) -> _Lines:
                 out.vertices.append(words[1:4])
                 out.vertex_lines.append(first)
             case "vt":
-                out.textures.append([*words[1:3], "0"][:2])  # of a curve's texture there is only u
+                out.textures.append([*words[1:3], "0"][:2])  # a texture for curves may have u only
                 out.texture_lines.append(first)
             case "f" | "fo":
                 _add_face(out, words[1:], first, path)
@@ -123,7 +122,7 @@ def _split(text: str, path: Path) -> _Lines:
 
 def _add_face(out: _Lines, words: list[str], line: int, path: Path) -> None:
     for corner in words:
-        word = corner[:40]  # as much as a message may show
+        word = corner[:40]  # limits the length of messages
         vertex, _, rest = word.partition("/")
         texture = rest.partition("/")[0]
         try:
@@ -141,7 +140,7 @@ def _add_face(out: _Lines, words: list[str], line: int, path: Path) -> None:
 
 
 def _counted(index: int, count: int) -> int:
-    """An index from zero: those of the file count from one, or backwards from the last of ``count`` so far."""
+    """A zero-based index: the file's count from one, or backwards from the last of ``count`` so far."""
     return index - 1 if index > 0 else count + index if index < 0 else -1
 
 
@@ -186,7 +185,7 @@ def _corner_uv(lines: _Lines, triangles: NDArray[np.int64], path: Path, notes: l
 def _parts(
     objects: list[tuple[str, int]], count: int, faces: NDArray[np.int64], polygon: NDArray[np.int64]
 ) -> tuple[Part, ...]:
-    """One part an object; none where objects share vertices, or have theirs in another order."""
+    """One part per object; none if objects share vertices, or use them in another order."""
     names = ["", *(name for name, _ in objects)]
     bounds = [0, *(int(np.searchsorted(polygon, start)) for _, start in objects), len(faces)]
     filled = [i for i in range(len(names)) if bounds[i + 1] > bounds[i]]
@@ -195,7 +194,7 @@ def _parts(
     highs = [int(faces[run].max()) for run in runs]
     if any(high >= low for high, low in zip(highs, lows[1:], strict=False)):
         return ()
-    ends = [0, *lows[1:], count]  # vertices that no face uses belong to the object before them
+    ends = [0, *lows[1:], count]  # unused vertices belong to the object before them
     return tuple(
         Part(names[i], slice(ends[k], ends[k + 1]), run) for k, (i, run) in enumerate(zip(filled, runs, strict=True))
     )

@@ -1,6 +1,6 @@
-"""OFF (Geomview) as text: vertices in the file's order, polygons of any number of corners.
+"""Reader of text OFF (Geomview): vertices in the file's order, polygons of any number of corners.
 
-Own parser: trimesh cuts concave polygons wrong and fails on those of more than four corners.
+Own parser: trimesh triangulates concave polygons wrongly and fails on those of more than four corners.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from warpjld.files.text_file import read_text
 
 __all__ = ["read_off"]
 
-_HEAD = re.compile(r"(ST)?C?N?OFF\b")  # with texture coordinates, colours, normals: behind each position
+_HEAD = re.compile(r"(ST)?C?N?OFF\b")  # texture coordinates, colours and normals follow the position
 
 
 def read_off(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Vertices (W, 3), corners of every polygon (P,), and their vertices, polygon after polygon (C,).
+    """Vertices (W, 3), number of corners of every polygon (P,), and vertex indices of all corners (C,).
 
     Raises:
-        InputError: It cannot be read, or is not as OFF has it.
+        InputError: It cannot be read, or is not valid OFF.
     """
     path = Path(path)
     stripped = (line.split("#", 1)[0].strip() for line in read_text(path, errors="replace").split("\n"))

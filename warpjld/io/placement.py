@@ -1,4 +1,4 @@
-"""Units and up axis: everything inside is metres and Y up."""
+"""Conversion of a file's units and up axis to metres and Y up, with guesses where the file does not state them."""
 
 from __future__ import annotations
 
@@ -16,25 +16,26 @@ __all__ = ["METRES", "place"]
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 _WORDS = {"in": "inches"}
-_HAND = (0.10, 0.30)  # wrist to middle fingertip, children of three to giants [m]
-_FINGERTIP = 1.15  # hand's length per distance from the wrist to the last knuckle
-_SMALLER, _LARGER = 0.6, 1.2  # beyond plausible sizes that a unit is guessed for
-_BODY = (0.5, 2.6)  # ankle to head [m]
+_HAND = (0.10, 0.30)  # plausible length from wrist to middle fingertip, from children of three to giants [m]
+_FINGERTIP = 1.15  # length of a hand, per distance from the wrist to the last knuckle
+_SMALLER, _LARGER = 0.6, 1.2  # factors that widen plausible sizes for guessing a unit
+_BODY = (0.5, 2.6)  # plausible height from ankle to head [m]
 
 
 def place(
     source: SourceRig, roles: Roles, *, unit: str | None = None, scale: float | None = None, up: str | None = None
 ) -> SourceRig:
-    """``source`` in metres with Y up; guesses are noted, and an implausible size is told.
+    """``source`` in metres with Y up; guesses are noted, and an implausible size gives a warning.
 
     Args:
-        source: What the file says.
-        roles: What was recognised in its joints.
-        unit: ``m``, ``cm``, ``mm``, ``in`` or None: what the file says, else the one with which hand or body has a
+        source: Content of the file.
+        roles: Recognised joints.
+        unit: ``m``, ``cm``, ``mm``, ``in`` or None: the file's unit if stated, else the one that gives hand or body a
             plausible size.
-        scale: Factor by which all lengths are multiplied besides; where it is given and ``unit`` is not, nothing is
-            guessed: a file that does not say is taken to be in metres.
-        up: ``y``, ``z`` or None: what the file says, else Z only where a body's head lies that way from its hips.
+        scale: Additional factor for all lengths; if it is given without ``unit``, nothing is guessed: the unit is the
+            file's, or metres.
+        up: ``y``, ``z`` or None: the file's axis if stated, else Z if a body's head is in that direction from its
+            pelvis.
     """
     notes: list[str] = []
     doubts: list[str] = []
@@ -44,7 +45,7 @@ def place(
     possible = (_SMALLER * plausible[0], _LARGER * plausible[1])
     guess = unit is None and scale is None and source.metres is None
     if guess and size and not possible[0] <= size <= possible[1]:
-        # inches only where no metric unit gives a usual size
+        # inches only if no metric unit gives a usual size
         usual = [u for u, f in METRES.items() if plausible[0] <= size * f <= plausible[1]]
         fits = usual or [u for u, f in METRES.items() if u != "in" and possible[0] <= size * f <= possible[1]]
         if fits:
@@ -63,7 +64,7 @@ def place(
     placing = np.eye(4)
     placing[:3, :3] = factor * turn
     frames = source.tree.frames.copy()
-    frames[:, :3, :3] = turn @ frames[:, :3, :3]  # directions turn, they do not scale
+    frames[:, :3, :3] = turn @ frames[:, :3, :3]  # axes are rotated, not scaled
     frames[:, :3, 3] = factor * frames[:, :3, 3] @ turn.T
     return replace(
         source,
@@ -91,7 +92,7 @@ def _size(tree: SourceTree, roles: Roles) -> tuple[float, tuple[float, float], s
 
 
 def _implausible(size: float, plausible: tuple[float, float], what: str, scale: float) -> str:
-    """What is said of a size that no hand or body has, with the factor that would bring it to a usual one."""
+    """Warning about an implausible size, with the factor that would give a usual one."""
     usual = {"hand": 0.19, "body": 1.5}[what]
     ends = {"hand": "from wrist to fingertip", "body": "from ankle to head"}[what]
     reach = f"{plausible[0]:g} to {plausible[1]:g} m"

@@ -1,7 +1,7 @@
-"""PLY as it stands in the file: every vertex in the file's order, polygons of any number of corners.
+"""Reader of PLY that keeps every vertex in the file's order, and polygons of any number of corners.
 
-Own parser: trimesh splits vertices where texture coordinates meet, cuts concave polygons wrong and refuses binary
-files that mix triangles with quads; VTK reads memory beyond a damaged file.
+Own parser: trimesh splits vertices at texture seams, triangulates concave polygons wrongly and rejects binary files
+that mix triangles with quads; VTK reads memory beyond the end of a damaged file.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class PlyFile:
 
     Attributes:
         vertices: Positions, shape (W, 3).
-        counts: Corners of every polygon, shape (P,).
-        corners: Their vertices, polygon after polygon, shape (C,).
+        counts: Number of corners of every polygon, shape (P,).
+        corners: Vertex indices of all polygons' corners, shape (C,).
         uv: Texture coordinates of the vertices, shape (W, 2), or None.
         corner_uv: Texture coordinates of the polygons' corners, shape (C, 2), or None.
     """
@@ -55,7 +55,7 @@ class PlyFile:
 
 @dataclass
 class _Element:
-    """One kind of row: properties by name, as kind of their count ("" for a single number) and of their values."""
+    """A type of rows: properties by name, as type of the list's length ("" for a scalar) and type of the values."""
 
     name: str
     count: int
@@ -63,14 +63,14 @@ class _Element:
 
 
 _Column = tuple[NDArray[np.float64], NDArray[np.int64]]
-"""Values of a property, row after row, and how many each row has."""
+"""Values of a property of all rows, and the number of values of each row."""
 
 
 def read_ply(path: str | Path) -> PlyFile:
     """Read a PLY file, text or binary.
 
     Raises:
-        InputError: It cannot be read, or its body is not what its header says.
+        InputError: It cannot be read, or its body does not match its header.
     """
     path = Path(path)
     try:
@@ -92,7 +92,7 @@ def read_ply(path: str | Path) -> PlyFile:
 
 
 def _header(raw: bytes, path: Path) -> tuple[str, list[_Element], int]:
-    """Byte order ("" for text), elements, and where the body begins."""
+    """Byte order ("" for text), elements, and offset of the body."""
     end = raw.find(b"end_header")
     if not raw.startswith(b"ply") or end < 0:
         raise InputError("is no PLY file: want a header from 'ply' to 'end_header'", path=path)
@@ -164,7 +164,7 @@ class _Binary:
         return self._row_by_row(element) if same is None else same
 
     def _as_table(self, element: _Element) -> dict[str, _Column] | None:
-        """All rows at once, where all lists are as long as the first row's."""
+        """All rows at once if all lists have the same lengths as the first row's, else None."""
         fields: list[tuple[str, str, tuple[int, ...]]] = []
         long, at = {}, self._at
         for name, (many, kind) in element.properties.items():

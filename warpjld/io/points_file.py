@@ -1,4 +1,4 @@
-"""Points files: the named points of an actor (87) or of one hand (25) in a digitised surface, as JSON (B §2.1, R12).
+"""Points files (JSON): the named points of an actor (87) or of one hand (25) in a digitised surface (B §2.1, R12).
 
 ::
 
@@ -10,8 +10,8 @@
       }
     }
 
-Positions are in the surface's own unit and axes. All points of the set are wanted: what they are, and which hangs on
-which, is :mod:`warpjld.skeleton.actor_points`. They are joints as they are: none is merged, moved or added.
+Positions are in the surface's own unit and axes. All points of a set are required; their meaning and parents are in
+:mod:`warpjld.skeleton.actor_points`. They are used as joints unchanged: none is merged, moved or added.
 ``warpjld place SURFACE -o points.json`` proposes them, for correction by hand.
 """
 
@@ -37,14 +37,14 @@ from warpjld.suggest import did_you_mean
 
 __all__ = ["read_points_file", "write_points_file"]
 
-_SAME = 1e-6  # of the surface's size: nearer ones are one point
+_SAME = 1e-6  # distance up to which points coincide, per size of the surface
 
 
 def read_points_file(path: str | Path, mesh: MeshFile) -> SourceRig:
-    """Put the points of a points file into a surface.
+    """A surface with the points of a points file as joints.
 
     Raises:
-        InputError: Unreadable; a point that is not known, missing, no three numbers, or where another is.
+        InputError: Unreadable; an unknown, missing or invalid point, or two that coincide.
     """
     path = Path(path)
     content = read_json(path)
@@ -77,7 +77,7 @@ def read_points_file(path: str | Path, mesh: MeshFile) -> SourceRig:
 
 
 def _points(content: Any) -> dict[str, NDArray[np.float64]]:
-    """The points in their canonical order."""
+    """The points in canonical order."""
     table = content.get("points") if isinstance(content, dict) else None
     if not isinstance(table, dict) or not table:
         raise InputError('want {"points": {"pelvis": [x, y, z], …}}')
@@ -108,7 +108,7 @@ def _check_apart(points: Mapping[str, NDArray[np.float64]], size: float) -> None
 
 
 def write_points_file(path: str | Path, points: Mapping[str, NDArray[np.float64]]) -> None:
-    """Write points [the surface's own unit and axes] as a points file.
+    """Write points, in the surface's own unit and axes, as a points file.
 
     Raises:
         InputError: It cannot be written.

@@ -1,4 +1,4 @@
-"""Polygons → triangles, whatever their number of corners, convex or not."""
+"""Triangulation of polygons with any number of corners, convex or not."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from numpy.typing import NDArray
 __all__ = ["triangulate_polygons"]
 
 _STRAIGHT = 1e-9
-"""A corner that turns back by less than this, of the polygon's area, counts as straight."""
+"""Largest reflex turn that counts as straight, relative to the polygon's area."""
 
 
 def triangulate_polygons(
     points: NDArray[np.float64], counts: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles that cover polygons and keep their winding.
+    """Triangulate polygons, keeping their orientation.
 
-    Convex polygons are cut into the fan of their first corner, concave ones by VTK's ear clipping.
+    Convex polygons are split into the fan of their first corner, concave ones by VTK's ear clipping.
 
     Args:
-        points: Positions of all corners, polygon after polygon, shape (C, 3).
-        counts: Corners of every polygon, shape (P,), summing to C; polygons of fewer than three give nothing.
+        points: Positions of all polygons' corners, shape (C, 3).
+        counts: Number of corners of every polygon, shape (P,), with sum C; polygons of fewer than three are skipped.
 
     Returns:
-        Corners of every triangle, as numbers of rows of ``points``, shape (S, 3), and its polygon, shape (S,); in the
-        polygons' order.
+        Corners of every triangle, as rows of ``points``, shape (S, 3), and its polygon, shape (S,); in the polygons'
+        order.
     """
     counts = np.asarray(counts, dtype=np.int64)
     starts = np.cumsum(counts) - counts
@@ -46,7 +46,7 @@ def triangulate_polygons(
 
 
 def _convex(polygons: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether every corner turns the way the polygon does as a whole, shape (P,), of polygons (P, n, 3)."""
+    """Mask of convex polygons, shape (P,), for polygons (P, n, 3)."""
     edges = np.roll(polygons, -1, axis=1) - polygons
     normal = np.cross(polygons - polygons[:, :1], np.roll(polygons, -1, axis=1) - polygons[:, :1]).sum(axis=1)  # Newell
     turns = np.einsum("pnk,pk->pn", np.cross(np.roll(edges, 1, axis=1), edges), normal)
@@ -54,7 +54,7 @@ def _convex(polygons: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _clip_ears(polygons: NDArray[np.float64], fan: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles as corner numbers 0…n-1, and the polygon of each, of polygons (P, n, 3)."""
+    """Triangles as corner indices 0…n-1, and the polygon of each, for polygons (P, n, 3)."""
     import pyvista
 
     number, count = polygons.shape[:2]
@@ -62,6 +62,6 @@ def _clip_ears(polygons: NDArray[np.float64], fan: NDArray[np.int64]) -> tuple[N
     mesh = pyvista.PolyData(polygons.reshape(-1, 3), cells.ravel()).triangulate()
     corners = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 4)[:, 1:]
     owner = corners[:, 0] // count
-    missing = np.setdiff1d(np.arange(number), owner)  # crosses itself, so that it has no ear
+    missing = np.setdiff1d(np.arange(number), owner)  # self-intersecting, without an ear: use the fan
     corners = np.concatenate([corners % count, np.tile(fan, (len(missing), 1))])
     return corners, np.concatenate([owner, np.repeat(missing, len(fan))])

@@ -1,4 +1,4 @@
-"""Loading rigs of any kind: the reader is chosen by the file's suffix."""
+"""Loading of rigs of any format; the file's suffix determines the reader."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpjld.runtime.lazily import imported
 
 __all__ = ["load_rig"]
 
-_MOST_SCALE = 1e9  # surfaces are computed in single floats, whose squares end at 1e38
+_MOST_SCALE = 1e9  # surfaces are computed in float32, whose squares overflow at 1e38
 
 
 def load_rig(
@@ -35,23 +35,22 @@ def load_rig(
 
     Args:
         path: The file.
-        skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); needed where the surface has no joints.
+        skeleton: Skeleton file (JSON, see :mod:`warpjld.io.skeleton_file`); required if the surface has no joints.
         points: Points file (JSON, see :mod:`warpjld.io.points_file`) instead: an actor's 87 named points, or 25.
-        side: ``left`` or ``right`` for a single hand, where the file leaves it open or is wrong.
-        unit: ``m``, ``cm``, ``mm`` or ``in``; by default what the file says, else guessed from a hand's or body's
-            plausible size, with a note.
-        scale: Factor by which all lengths are multiplied besides; without ``unit`` nothing is guessed then.
-        up: ``y`` or ``z``: the file's up axis; by default what it says, else guessed; turned to Y.
-        joint_map: Joints stated by hand, which win over what is recognised: a JSON file (see
-            :mod:`warpjld.io.joint_map_file`), or what it holds: ``{"left.knee": "LeftShin", "ignore": ["Socket"]}``.
-        centre_joints: Whether joints that lie clearly off the middle of a finger's or limb's flesh are moved there (see
-            :mod:`warpjld.rig.centres`); the file's own joints stay where they are.
-
+        side: ``left`` or ``right`` for a single hand, if the file does not determine it or is wrong.
+        unit: ``m``, ``cm``, ``mm`` or ``in``; by default the file's, else guessed from a plausible size of hand or
+            body, with a note.
+        scale: Additional factor for all lengths; without ``unit`` nothing is guessed then.
+        up: ``y`` or ``z``: the file's up axis; by default the stated one, else guessed; rotated to Y.
+        joint_map: Stated joints, which override recognition: a JSON file (see :mod:`warpjld.io.joint_map_file`), or
+            its content: ``{"left.knee": "LeftShin", "ignore": ["Socket"]}``.
+        centre_joints: Whether joints clearly off the centre of a finger's or limb's flesh are moved there (see
+            :mod:`warpjld.rig.centres`); the file's own joints are not changed.
     Returns:
-        Skeleton in canonical names, metres; each hand has its 25 joints, those the file lacks added.
+        A rig with canonical joint names, in metres; each hand has 25 joints, of which missing ones are added.
 
     Raises:
-        InputError: Unreadable, no joints, broken data, or a bad argument.
+        InputError: Unreadable, no joints, invalid data, or an invalid argument.
 
     Examples:
         >>> import json
@@ -129,4 +128,4 @@ _READERS = {
     ".usdz": _USD,
     ".vrm": ("warpjld.io.vrm", "read_vrm_rig"),
 }
-"""What reads the rigs of each suffix; libraries are imported when a file of their kind is opened."""
+"""Suffix → reader of rigs; its module is imported when first used."""

@@ -1,4 +1,4 @@
-"""The meshes of a rig file, each as its reader places it → one surface with its skin."""
+"""Concatenation of the meshes of a rig file to one surface with its skin."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ __all__ = ["RigMesh", "joined"]
 
 @dataclass(frozen=True, eq=False)
 class RigMesh:
-    """One mesh in the file's world at rest, joints numbered as in its tree.
+    """One mesh in the file's world at rest; joints are indices into its tree.
 
     Attributes:
-        name: The mesh's.
+        name: Name of the mesh.
         vertices: Positions, shape (W, 3).
         faces: Triangles, shape (S, 3).
         joints: Influencing joints, shape (W, K).
         weights: Their weights, rows summing to one, shape (W, K).
-        rigid: Joint that the whole mesh follows rigidly, -1 for flesh.
+        rigid: Joint that the whole mesh follows rigidly, -1 if deformable.
         uv: Texture coordinates of the vertices, shape (W, 2), or None.
-        corner_uv: Those of the triangles' corners, where a vertex may have several, shape (S, 3, 2), or None.
-        polygons: Polygon that each triangle is a part of, shape (S,), or None where all are triangles.
-        polygon_count: How many polygons the file has there, with those that give no triangle.
+        corner_uv: Texture coordinates of the triangles' corners, if a vertex has several, shape (S, 3, 2), or None.
+        polygons: Polygon that each triangle is part of, shape (S,), or None if all polygons are triangles.
+        polygon_count: Number of polygons in the file, including those without triangles.
     """
 
     name: str
@@ -44,8 +44,8 @@ class RigMesh:
 
 
 def joined(meshes: Sequence[RigMesh]) -> dict[str, Any]:
-    """Fields of a :class:`~warpjld.io.source.SourceRig`: vertices, faces, texture, parts and skin of all, one after the
-    other. Where only some meshes have texture coordinates, those of the others are 0."""
+    """Fields of a :class:`~warpjld.io.source.SourceRig`: concatenated vertices, faces, texture coordinates, parts and
+    skins. Meshes without texture coordinates get zeros if others have some."""
     vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     face = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
     faces = np.concatenate([mesh.faces + vertex[m] for m, mesh in enumerate(meshes)])

@@ -1,12 +1,12 @@
-"""Pieces of a surface without flesh: eyes, teeth, nails, buttons, armour, which go with one bone as they are.
+"""Detection of rigid pieces of a surface: eyes, teeth, nails, buttons, armour, which follow a single bone.
 
-A piece is what hangs together by faces or by vertices at the same place, so that a body cut along its materials is one.
-Without flesh is one inside which no bone lies, and
+A piece is a component connected by faces or coincident vertices, so that a body split by materials is one piece. A
+piece is rigid if no bone lies inside it, and
 
-* which is painted to one joint, or
-* where nothing is painted, which is closed and no larger than the bone it is nearest to.
+* it is painted to one joint, or
+* without painted weights, it is closed and no larger than the bone nearest to it.
 
-The largest piece is always flesh. Clothes, which go around several bones, are neither.
+The largest piece is never rigid. Clothes, which contain bones, are deformable, too.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["rigid_parts"]
 
-_SHARE = 0.9  # of the weight of a piece that one joint has where it is painted to that joint alone
-_SAMPLES = 15  # places along a bone, of which
-_WITHIN = 0.5  # this share lies inside a piece that holds the bone
-_SAME_PLACE = 1e-6  # of the surface's size
+_SHARE = 0.9  # smallest share of a piece's weight on one joint at which the piece counts as painted to that joint
+_SAMPLES = 15  # samples along a bone
+_WITHIN = 0.5  # smallest share of samples inside a piece at which the piece contains the bone
+_SAME_PLACE = 1e-6  # distance at which vertices coincide, per size of the surface
 
 
 def rigid_parts(
     surface: Surface, skeleton: Skeleton, skin: Skin | None, rigid: NDArray[np.int32] | None
 ) -> tuple[NDArray[np.int32] | None, tuple[str, ...]]:
-    """Joint that every vertex follows rigidly, -1 for flesh, shape (V,), or None where all is flesh; and notes.
+    """Joint that every vertex follows rigidly, -1 if deformable, shape (V,), or None if all are; and notes.
 
     Args:
         surface: The rest surface.
         skeleton: The rest skeleton.
-        skin: Painted weights, where there are any.
-        rigid: What is rigid already, as the file says, in the same form: it stays.
+        skin: Painted weights, or None.
+        rigid: Rigid vertices stated by the file, in the same form, which are kept.
     """
     count = len(surface.vertices)
     out = np.full(count, -1, dtype=np.int32) if rigid is None else rigid.copy()
@@ -60,7 +60,7 @@ def rigid_parts(
 
 
 def _pieces(surface: Surface) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Vertices and faces of every piece."""
+    """Vertex and face indices of every connected piece."""
     count = len(surface.vertices)
     pairs = close_pairs(surface.vertices, _SAME_PLACE * surface.size)
     label = connected_parts(np.concatenate([surface.faces[:, :2], surface.faces[:, 1:], pairs]), count)
@@ -77,14 +77,14 @@ def _area(surface: Surface, faces: NDArray[np.int64]) -> float:
 
 
 def _painted(skin: Skin, vertices: NDArray[np.int64]) -> int:
-    """The joint that has nearly all the weight of a piece, or -1."""
+    """The joint with nearly all the weight of a piece, or -1."""
     total = np.bincount(skin.joints[vertices].ravel(), weights=skin.weights[vertices].ravel())
     joint = int(total.argmax())
     return joint if total[joint] > _SHARE * total.sum() else -1
 
 
 def _nearest_bone(surface: Surface, skeleton: Skeleton, vertices: NDArray[np.int64], faces: NDArray[np.int64]) -> int:
-    """The joint at which the bone nearest to a closed piece begins, or -1 where the piece is larger than that bone."""
+    """Proximal joint of the bone nearest to a closed piece, or -1 if the piece is open or larger than that bone."""
     triangles = surface.faces[faces]
     edges = np.sort(np.concatenate([triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]), axis=1)
     if (np.unique(edges, axis=0, return_counts=True)[1] != 2).any():
@@ -120,6 +120,6 @@ def _bones(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def _name(surface: Surface, vertex: int) -> str:
-    """The source's mesh that a vertex belongs to."""
+    """Name of the source's mesh that a vertex belongs to."""
     source = int(np.flatnonzero(surface.weld == vertex)[0])
     return next((p.name for p in surface.parts if p.vertices.start <= source < p.vertices.stop), "surface")

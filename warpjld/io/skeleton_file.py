@@ -1,4 +1,4 @@
-"""Skeleton files: the joints of a surface that has none of its own, as JSON.
+"""Skeleton files (JSON): the joints of a surface that has none of its own.
 
 ::
 
@@ -10,9 +10,9 @@
       ]
     }
 
-Positions are in the surface's own unit and axes. Names may be canonical or of any convention that is recognised;
-``axis`` (the flexion axis), ``limits`` (degrees, per channel) and ``initial`` (degrees, per channel: the angles of the
-digitised pose, counted from the straight joint) are optional and overrule what is worked out.
+Positions are in the surface's own unit and axes. Names may be canonical or of any recognised convention; ``axis`` (the
+flexion axis), ``limits`` (degrees, per channel) and ``initial`` (degrees, per channel: angles of the digitised pose,
+counted from the straight joint) are optional and override computed values.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ _KEYS = ("name", "parent", "position", "axis", "limits", "initial")
 
 
 def read_skeleton_file(path: str | Path, mesh: MeshFile) -> SourceRig:
-    """Put the joints of a skeleton file into a surface.
+    """A surface with the joints of a skeleton file.
 
     Raises:
-        InputError: Unreadable, or an entry that is not as described above.
+        InputError: Unreadable, or an entry that is invalid by the description above.
     """
     path = Path(path)
     content = read_json(path)
@@ -94,7 +94,7 @@ def _rig(path: Path, content: Any, mesh: MeshFile) -> SourceRig:
         if entry.get("initial") is not None:
             initial[j] = _initial(entry["initial"], names[j])
     _check_loops(names, parents)
-    # the 87 by their own or their canonical names, other joints beside them
+    # an actor's 87 points, by their own or their canonical names, possibly with other joints
     spelled = next((way for way in (list(CANONICAL), list(CANONICAL.values())) if number.keys() >= set(way)), None)
     return SourceRig(
         path=mesh.path,
@@ -164,7 +164,7 @@ def _check_loops(names: list[str], parents: NDArray[np.int64]) -> None:
 
 
 def write_skeleton_file(path: str | Path, skeleton: Skeleton) -> None:
-    """Write a skeleton as a skeleton file that reads back as the same one.
+    """Write a skeleton as a skeleton file, from which the same skeleton can be read.
 
     Raises:
         InputError: It cannot be written.

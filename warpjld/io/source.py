@@ -1,4 +1,4 @@
-"""What a rig file says, before anything is recognised in it: the common form every reader fills."""
+"""Raw content of a rig file before recognition: the common result of all readers."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ class SourceRig:
         vertices: Rest positions, shape (W, 3).
         faces: Triangles, shape (S, 3).
         uv: Texture coordinates, shape (W, 2), or None.
-        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), instead of ``uv`` where some vertex
-            has several.
+        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2), instead of ``uv`` if a vertex has
+            several.
         parts: The file's meshes.
-        polygons: Polygon of the file that each triangle is a part of, shape (S,), or None where all are triangles.
-        joints: Influencing joints of ``tree`` per vertex, shape (W, K), or None where no skin is painted.
+        polygons: Polygon of the file that each triangle is part of, shape (S,), or None if all are triangles.
+        joints: Influencing joints of ``tree`` per vertex, shape (W, K), or None without painted weights.
         weights: Their weights, rows summing to one, shape (W, K).
-        axes: Flexion axes the file states, by joint number.
-        limits: Channel limits [rad] the file states, by joint number then channel.
-        initial: Angles of the rest pose [rad] the file states, by joint number then channel.
-        placing: Similarity that brought vertices and joints from the file's units and axes to these, shape (4, 4).
-        rigid: Joint of ``tree`` that a vertex follows rigidly (a mesh that hangs on a joint), -1 for flesh, shape
-            (W,); None where all is flesh.
-        metres: Metres a unit of length is, where the file says so.
-        up: The file's up axis, ``y`` or ``z``, where it says so.
-        placed: Whether an animator placed the joints: they stay where they are, none is merged, moved or added.
-        stated: Joints of ``tree`` by canonical name, where the file itself says which is which.
-        notes: What was mended on the way.
-        suspicious: What is probably wrong, and what to do about it.
+        axes: Stated flexion axes, by joint index.
+        limits: Stated channel limits [rad], by joint index, then channel.
+        initial: Stated angles of the rest pose [rad], by joint index, then channel.
+        placing: Similarity from the file's units and axes to those of this object, shape (4, 4).
+        rigid: Joint of ``tree`` that a vertex follows rigidly (a mesh parented to a joint), -1 if deformable, shape
+            (W,); None if all are deformable.
+        metres: The file's unit of length [m], or None if not stated.
+        up: The file's up axis, ``y`` or ``z``, or None if not stated.
+        placed: Whether the joints were placed by hand: none is merged, moved or added.
+        stated: Joints of ``tree`` by canonical name, if the file itself states them.
+        notes: Repairs, for the user.
+        suspicious: Probable errors, each with a remedy.
     """
 
     path: Path
@@ -67,5 +67,5 @@ class SourceRig:
     suspicious: tuple[str, ...] = ()
 
     def stated_names(self) -> dict[str, str]:
-        """``stated`` by the file's own names, of several joints of one name the second as ``name#2``."""
+        """``stated`` with the file's joint names; the second of several with the same name as ``name#2``."""
         return {canonical: self.tree.own_name(joint) for canonical, joint in self.stated.items()}

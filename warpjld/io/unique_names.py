@@ -1,4 +1,4 @@
-"""Different names for things that a file calls alike."""
+"""Unique names for objects with duplicate names in a file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["unique_names"]
 
 
 def unique_names(names: Sequence[str]) -> list[str]:
-    """Names of which the second of a kind is called ``name#2``."""
+    """The names, with ``#2`` and so on appended to repeated ones."""
     out: dict[str, None] = {}
     last: dict[str, int] = {}
     for name in names:

@@ -1,4 +1,4 @@
-"""VRM avatars → :class:`SourceRig`: binary glTF that states which joint is which."""
+"""Reader of VRM avatars as :class:`SourceRig`: binary glTF with a table of humanoid joints."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ __all__ = ["read_vrm_rig"]
 def read_vrm_rig(path: str | Path) -> SourceRig:
     """Read a .vrm file, version 0.x or 1.0.
 
-    Joints of its humanoid table that no skin uses are joints, too. Hair and skirts that its spring bones swing stay
+    Joints of its humanoid table that no skin uses become joints, too. Joints of hair and skirts (spring bones) are
     joints like all others.
 
     Raises:
-        InputError: Not glTF, no skin, no humanoid table, or broken data.
+        InputError: Not glTF, no skin, no humanoid table, or invalid data.
     """
     rig = read_gltf_rig(path)
     document = open_document(path)

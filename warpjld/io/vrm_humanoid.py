@@ -1,7 +1,7 @@
-"""The humanoid table of VRM files: which node is which bone of a person, stated by the file itself.
+"""The humanoid table of VRM files, which assigns nodes to the bones of a person.
 
-VRM 1.0 (``VRMC_vrm``) and its animations (``VRMC_vrm_animation``) keep a node by bone; VRM 0.x (``VRM``) a list of
-pairs, and counts thumbs one joint further out: its Proximal is what 1.0 calls Metacarpal.
+VRM 1.0 (``VRMC_vrm``) and its animations (``VRMC_vrm_animation``) store a node per bone; VRM 0.x (``VRM``) a list of
+pairs, in which thumb joints have the name of the next joint: its Proximal is Metacarpal in 1.0.
 Sources: https://github.com/vrm-c/vrm-specification, VRMC_vrm-1.0/humanoid.md and 0.0/README.md.
 """
 
@@ -31,14 +31,14 @@ _THUMB = {"Metacarpal": "base", "Proximal": "knuckle2", "Distal": "knuckle3"}
 
 
 def humanoid_nodes(document: Document, extensions: tuple[str, ...] = ("VRMC_vrm", "VRM")) -> dict[str, int]:
-    """Canonical joint → node, as the file states it; eyes and jaw are no joints here.
+    """Canonical joint → node, as stated in the file; eyes and jaw are ignored.
 
     Args:
         document: The file.
-        extensions: Which extensions may hold the table; the first that is there counts.
+        extensions: Extensions that may hold the table; the first present one is used.
 
     Raises:
-        InputError: There is no such extension, or its table is broken.
+        InputError: No such extension, or an invalid table.
     """
     content = document.gltf.extensions or {}
     name = next((e for e in extensions if e in content), None)
@@ -65,7 +65,7 @@ def humanoid_nodes(document: Document, extensions: tuple[str, ...] = ("VRMC_vrm"
 
 
 def _words(bones: dict[str, Any], old: bool) -> dict[str, str]:
-    """Canonical joint by VRM's bone."""
+    """VRM bone → canonical joint."""
     words = {"hips": "pelvis", "neck": "neck1", "head": "head"}
     for n, bone in enumerate((b for b in _TRUNK if b in bones), start=1):
         words[bone] = f"spine{n}"

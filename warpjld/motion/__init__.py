@@ -1,4 +1,4 @@
-"""Keys and Kochanek–Bartels in-betweens of joint angles (R2–R5), and motions of other programs."""
+"""Key-framed joint angles with Kochanek–Bartels interpolation (R2–R5), and import of motions from other programs."""
 
 from warpjld.motion.csv_file import read_csv, write_csv
 from warpjld.motion.load import MOTION_FORMATS, LoadedMotion, load_motion

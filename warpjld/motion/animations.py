@@ -1,4 +1,4 @@
-"""The animations of a file, by name."""
+"""Names of the animations in a file, and the choice of one."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["animation_names", "choose_animation"]
 
 
 def animation_names(path: str | Path) -> tuple[str, ...]:
-    """Names of the animations of a file, as ``load_motion`` takes them; none of a kind that holds a single motion.
+    """Names of a file's animations, as ``load_motion`` takes them; empty for formats that hold a single motion.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: The file cannot be read.
     """
     path = Path(path)
     lister = _LISTERS.get(path.suffix.lower())
@@ -31,15 +31,15 @@ def animation_names(path: str | Path) -> tuple[str, ...]:
 
 
 def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> tuple[str, tuple[str, ...]]:
-    """One of a file's animations, and a note where nobody said which of several.
+    """Name of the chosen animation, and a note if it was chosen by default among several.
 
     Args:
         wanted: A name in any case; None for the first.
-        names: All of them, at least one, each different.
+        names: Names of all animations, at least one, all different.
         path: The file, for messages.
 
     Raises:
-        InputError: There is none of that name.
+        InputError: No animation has that name, or several have it in other cases.
     """
     if wanted is None:
         if len(names) == 1:
@@ -67,4 +67,4 @@ _LISTERS = {
     ".usdc": _USD,
     ".usdz": _USD,
 }
-"""What lists the animations of each suffix."""
+"""Suffix → function that lists the file's animations."""

@@ -1,4 +1,4 @@
-"""NumPy's files of arrays, without the Python objects that they may hold: reading those runs code."""
+"""NumPy array files, read without pickled Python objects, since unpickling runs code."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ __all__ = ["read_arrays"]
 
 
 def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
-    """Arrays of an ``.npz`` file by name; the array of an ``.npy`` file is called "".
+    """Arrays of an ``.npz`` file by name; the array of an ``.npy`` file has the name "".
 
     Raises:
-        InputError: It cannot be read, is no such file, holds pickled objects, or more than ``unpacked-bytes`` allows.
+        InputError: Unreadable, not a NumPy file, with pickled objects, or larger than ``unpacked-bytes`` allows.
     """
     path = Path(path)
     check_input(path)
@@ -41,7 +41,7 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     if path.suffix.lower() == ".npy":
         check_limit("unpacked-bytes", path.stat().st_size, path=path)
-        # mapped, so that a header that announces more than there is allocates nothing
+        # memory-mapped, so that a header that announces more data than the file has does not allocate it
         return {"": np.array(np.load(path, mmap_mode="r", allow_pickle=False))}
     arrays = {}
     check_archive(path, "archive of NumPy arrays (.npz)")

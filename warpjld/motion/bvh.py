@@ -1,4 +1,4 @@
-"""Reading BVH files: a hierarchy of offsets, then a line of channel values a frame."""
+"""Reader of BVH files: a hierarchy of offsets, then a line of channel values per frame."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _CHANNELS = {f"{axis}{kind}": (kind, a) for a, axis in enumerate(_AXES) for kind
 
 
 _POSE_RATE = 30.0
-"""Frames a second of a single frame, which may last no time."""
+"""Frames a second of a file with a single frame, whose frame time may be 0."""
 _SLOWEST, _FASTEST = 1.0, 10000.0
-"""Frames a second that no recording has less or more of."""
+"""Limits of plausible frame rates [1/s]."""
 
 
 @dataclass
@@ -36,18 +36,18 @@ class _Joint:
 
 
 def read_bvh(path: str | Path) -> Clip:
-    """Read a BVH file: any hierarchy, any order of channels. End sites become joints called ``<parent> end``.
+    """Read a BVH file with any hierarchy and any order of channels. End sites become joints ``<parent> end``.
 
-    Rotations apply in the order of their channels, each about an axis the previous ones have turned. Positions of
-    joints below the root stand in place of their OFFSET in some files and add to it in others: whichever keeps bones
-    nearer to their OFFSETs is meant.
+    Rotations apply in the order of their channels, each about an axis that the previous ones have turned. Position
+    channels of joints below the root replace the OFFSET in some files and add to it in others: the reading that keeps
+    bones closer to their OFFSETs is taken.
 
-    Tabs, byte order marks, comments (``//`` or ``#`` and what follows), lines broken elsewhere, decimal commas,
-    keywords without the blank after their colon, and another number of frames than announced are taken as they are, the
-    last with a note, as is a last frame cut off. Channels of scale are read over.
+    Tabs, byte order marks, comments (``//`` or ``#`` to the end of the line), unusual line breaks, decimal commas,
+    keywords without a blank after the colon, a number of frames other than announced, and a truncated last frame are
+    accepted, the last two with a note. Scale channels are read and ignored.
 
     Raises:
-        InputError: Unreadable, or not as the format wants it, with the line.
+        InputError: Unreadable, or not according to the format, with the line.
     """
     lines = BvhLines(path)
     joints = _hierarchy(lines)
@@ -103,7 +103,7 @@ def _channels(lines: BvhLines, words: list[str], joint: str) -> list[tuple[str, 
 
 
 def _motion(lines: BvhLines, channels: int) -> tuple[NDArray[np.float64], float, list[str]]:
-    """Rows of channel values, frames a second, and notes on rows more or fewer than announced."""
+    """Rows of channel values, frames a second, and notes on a wrong number of rows."""
     if channels == 0:
         raise lines.error("no joint has CHANNELS: nothing moves")
     words = lines.setting("Frames")
@@ -125,7 +125,7 @@ def _motion(lines: BvhLines, channels: int) -> tuple[NDArray[np.float64], float,
 
 
 def _rows(lines: BvhLines, channels: int, count: int) -> tuple[list[NDArray[np.float64]], list[str]]:
-    """Channel values of every frame, and notes; where lines are broken elsewhere, if their numbers fill all frames."""
+    """Channel values of every frame, and notes; line breaks are ignored if the numbers fill all frames exactly."""
     rows: list[NDArray[np.float64]] = []
     notes: list[str] = []
     words_next = lines.next_or_none()
@@ -153,13 +153,13 @@ def _rows(lines: BvhLines, channels: int, count: int) -> tuple[list[NDArray[np.f
 
 
 def _count(word: str) -> int | None:
-    """How many, where that is what a word says."""
+    """The word as a non-negative integer; None if it is none."""
     whole = re.fullmatch(r"([0-9]{1,15})([.,]0*)?", word, re.ASCII)
     return int(whole[1]) if whole else None
 
 
 def _doubts(joints: list[_Joint], values: NDArray[np.float64], rate: float) -> list[str]:
-    """What of a file's values is not followed, or hardly meant."""
+    """Warnings about values that are ignored or implausible."""
     found = []
     kinds = [(joint.name, kind) for joint in joints for kind, _ in joint.channels]
     scaled = [
@@ -205,7 +205,7 @@ def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes:
 
 
 def _add_to_offsets(joints: list[_Joint], places: NDArray[np.float64], offsets: NDArray[np.float64]) -> bool:
-    """Whether position channels below the root state what is added to an OFFSET, as Blender writes them."""
+    """Whether position channels below the root add to the OFFSET, as Blender writes them."""
     inner = [
         j for j, joint in enumerate(joints) if joint.parent >= 0 and any(k == "position" for k, _ in joint.channels)
     ]

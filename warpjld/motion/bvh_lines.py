@@ -1,4 +1,4 @@
-"""BVH as text: statements with the numbers of their lines, however a program breaks its lines."""
+"""BVH files as statements with line numbers, independent of how a program breaks lines."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from warpjld.files.text_file import read_text
 __all__ = ["NAMED", "BvhLines"]
 
 _COMMENT = re.compile(r"(^|\s)(//|#).*")
-"""Nothing of the format begins with these; within a name they are the name's."""
+"""Comments; ``//`` or ``#`` within a name belongs to the name."""
 
 NAMED = ("ROOT", "JOINT", "END", "ENDSITE")
-"""What a name follows, up to the brace."""
+"""Keywords that are followed by a name, up to the brace."""
 _INSIDE = ("OFFSET", "CHANNELS", "MOTION", *NAMED)
 
 
 class BvhLines:
-    """Lines with content, as words, with their numbers for messages."""
+    """Lines with content, split into words, with line numbers for messages."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = path
@@ -33,7 +33,7 @@ class BvhLines:
         self.number = 0
 
     def next(self, wanted: str) -> list[str]:
-        """Words of the next line."""
+        """Words of the next line; InputError, with ``wanted`` as what was expected, at the end of the file."""
         words = self.next_or_none()
         if words is None:
             raise self.error(f"the file ends here; expected {wanted}")
@@ -47,14 +47,14 @@ class BvhLines:
         return words
 
     def expect(self, keyword: str) -> list[str]:
-        """Words after a keyword the next line must begin with."""
+        """Words after a keyword that the next line must start with."""
         words = self.next(f"'{keyword}'")
         if words[0].lower() != keyword.lower():
             raise self.error(f"expected '{keyword}', not '{words[0]}'")
         return words[1:]
 
     def setting(self, keyword: str) -> list[str]:
-        """Words after a keyword of one or two words and a colon, with or without blanks."""
+        """Words after a keyword of one or two words and a colon, with or without blanks between them."""
         line = " ".join(self.next(f"'{keyword}:'"))
         found = re.match(rf"{keyword.replace(' ', ' ?')} ?(?::|(?= )) ?", line, re.IGNORECASE)
         if found is None:
@@ -62,7 +62,7 @@ class BvhLines:
         return line[found.end() :].split()
 
     def numbers(self, words: list[str], count: int, what: str) -> NDArray[np.float64]:
-        """Words as finite numbers."""
+        """The words as ``count`` finite numbers, shape (count,); ``what`` names them in messages."""
         if len(words) != count:
             raise self.error(f"{what}: want {count} numbers, got {len(words)}")
         try:
@@ -82,7 +82,7 @@ class BvhLines:
 
 
 def _statements(lines: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
-    """Lines of the hierarchy, broken as the format's examples are; what follows MOTION as it is."""
+    """Statements of the hierarchy, one each; lines after MOTION unchanged."""
     for number, words in lines:
         text = " ".join(words)
         if words[0].upper() == "MOTION" and len(words) == 1:

@@ -1,4 +1,4 @@
-"""Names of channels: ``joint.channel`` or ``root.x``; the paper's joint numbers and the metacarpus as aliases."""
+"""Channel names: ``joint.channel`` or ``root.x``, with the paper's joint numbers and the metacarpus as aliases."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _METACARPUS = ("ring.carpometacarpal", "pinky.carpometacarpal")
 
 
 def canonical_channels(channel: str) -> tuple[str, ...]:
-    """The channels a name stands for, in lower case.
+    """The channels that a name denotes, in lower case.
 
     ``joint 14.flexion`` is ``index.knuckle3.flexion`` by the paper's numbers (A Fig. 2); ``metacarpus.flexion`` is
-    the flexion of its joints 1 and 2, the ring's and the pinky's carpometacarpals (R8). A side may stand before each.
+    the flexion of joints 1 and 2, the carpometacarpals of ring and pinky (R8). A side may precede each.
 
     Raises:
         InputError: Not of the form ``joint.channel``, or no such channel or joint number.
@@ -50,7 +50,7 @@ def canonical_channels(channel: str) -> tuple[str, ...]:
 
 
 def resolve_channel(channel: str, skeleton: Skeleton) -> tuple[int, int]:
-    """Joint and channel number of a canonical ``joint.channel`` name in a skeleton.
+    """Joint index and channel index of a canonical ``joint.channel`` name in a skeleton.
 
     Raises:
         InputError: The skeleton has no such joint, or several.

@@ -1,4 +1,4 @@
-"""A recorded motion of some other skeleton, before it drives a rig."""
+"""A recorded motion of any skeleton, before retargeting."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Clip"]
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """F frames of a skeleton of B bones, in its file's names, units and axes.
+    """F frames of a skeleton of B joints, in its file's names, units and axes.
 
     Attributes:
         names: The file's joint names, parents first.
@@ -25,8 +25,8 @@ class Clip:
         positions: Joint positions, shape (F, B, 3).
         rotations: Rotation of every bone from rest, world axes, unit quaternions x, y, z, w, shape (F, B, 4).
         rate: Frames a second.
-        notes: What a reader of the result should know of the file.
-        warnings: What of the file is not followed, or looks wrong.
+        notes: Information for the user of the result.
+        warnings: What is ignored in the file, or looks wrong.
     """
 
     names: tuple[str, ...]
@@ -58,17 +58,17 @@ class Clip:
         )
 
     def locals(self) -> NDArray[np.float64]:
-        """Rotations of all bones relative to their parent's, shape (F, B, 4)."""
+        """Rotations of all bones relative to their parents', shape (F, B, 4)."""
         inner = self.parents >= 0
         out = self.rotations.copy()
         out[:, inner] = multiply(conjugate(self.rotations[:, self.parents[inner]]), self.rotations[:, inner])
         return out
 
     def rebased(self, frame: int, turns: NDArray[np.float64]) -> Clip:
-        """The same motion, told from another rest: the pose of a frame, with every bone turned back.
+        """The same motion with another rest pose: that of a frame, with every bone rotated back.
 
-        With p and R the positions and rotations of joints, f the frame and H_j the turn of bone j, that rest's bones
-        and the rotations from it are
+        With p and R the positions and rotations of joints, f the frame and H_j the rotation of bone j, the new rest's
+        bones and the rotations from it are
 
             d'_j = H_j⁻¹ (p_child(f) − p_j(f)),   R'_j(t) = R_j(t) R_j(f)⁻¹ H_j
 
@@ -87,6 +87,6 @@ class Clip:
         return replace(self, rest=rest, rotations=multiply(self.rotations, back))
 
     def turned_rest(self, turn: NDArray[np.float64]) -> Clip:
-        """The same motion, told from its rest turned as a whole by a quaternion."""
+        """The same motion with its rest pose rotated as a whole by a quaternion."""
         rotations = multiply(self.rotations, conjugate(turn))
         return replace(self, rest=rotate(turn, self.rest), rotations=rotations)

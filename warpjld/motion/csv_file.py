@@ -1,7 +1,7 @@
-"""Motions as tables: a ``frame`` column, then channels in degrees, the root's displacement in metres.
+"""Motions as CSV tables: a ``frame`` column, then channels in degrees, the root's displacement in metres.
 
-Cells are separated by commas, semicolons or tabs, whichever makes ``frame`` the first heading; a first line ``sep=;``,
-as spreadsheets write it, says so too. Numbers have decimal points, or decimal commas all through the file.
+Cells are separated by commas, semicolons or tabs, whichever makes ``frame`` the first heading, or as stated by a first
+line ``sep=;``, as spreadsheets write it. Numbers have decimal points, or decimal commas throughout the file.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _SAID = re.compile(r"sep=([,;\t])", re.IGNORECASE)
 
 
 def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float = 30.0) -> Motion:
-    """Read a motion from a CSV file. An empty cell is no key: the spline runs on between its neighbours.
+    """Read a motion from a CSV file. An empty cell sets no key: the spline interpolates its neighbours.
 
     Args:
         path: The file. First line: ``frame`` and channels, such as ``frame,index.base.flexion,wrist.pivot,root.y``.
-        skeleton: Whose joints the channels must be; None to accept any.
-        rate: Frames a second: the file does not say.
+        skeleton: Skeleton that must have the channels' joints; None to accept any.
+        rate: Frames a second, which the file does not state.
 
     Raises:
         InputError: Unreadable, no or a wrong header, an unknown joint, a cell that is not a number, decimal points and
@@ -54,7 +54,7 @@ def read_csv(path: str | Path, *, skeleton: Skeleton | None = None, rate: float 
 
 
 def _separator(lines: Sequence[str]) -> tuple[str, int]:
-    """What separates the cells, and how many lines say nothing else."""
+    """The cell separator, and the number of lines up to a ``sep=`` line, which are to be skipped."""
     first = next((k for k, line in enumerate(lines) if line.strip()), 0)
     if lines and (said := _SAID.fullmatch(lines[first].strip('\ufeff "\r\n'))):
         return said[1], first + 1
@@ -74,7 +74,7 @@ def _read_rows(
     last = -math.inf
     for cells in reader:
         line = skipped + reader.line_num
-        while cells and not cells[-1].strip():  # separators at the ends of lines
+        while cells and not cells[-1].strip():  # trailing separators
             cells.pop()
         if not any(cell.strip() for cell in cells):
             continue
@@ -84,7 +84,7 @@ def _read_rows(
         if len(cells) > len(header):
             hint = "; decimal commas need semicolons or tabs between cells" if separator == "," else ""
             raise InputError(f"{len(cells)} cells under {len(header)} headings{hint}", path=path, line=line)
-        whole = re.fullmatch(r"\s*([0-9]+)[.,]0\s*", cells[0], re.ASCII)  # whatever the decimal mark of the others
+        whole = re.fullmatch(r"\s*([0-9]+)[.,]0\s*", cells[0], re.ASCII)  # with either decimal mark
         frame = float(whole[1]) if whole else _number(cells[0], marks, path, line, 1)
         if frame is None:
             raise InputError("no frame number", path=path, line=line, column=1)
@@ -107,7 +107,7 @@ def write_csv(path: str | Path, motion: Motion, *, frames: ArrayLike | None = No
     """Write a motion as a CSV file.
 
     Without ``frames`` the keys are written, if reading them back gives the same splines; a motion with tension,
-    continuity or bias, which a table cannot hold, is written with every frame instead.
+    continuity or bias, which a table cannot hold, is sampled at every frame instead.
 
     Args:
         path: The file to write.
@@ -157,7 +157,7 @@ def _number(cell: str, marks: dict[str, int], path: str | Path, line: int, colum
 
     Args:
         cell: The cell.
-        marks: Decimal marks → line where each was first seen; added to.
+        marks: Decimal marks → line of first occurrence; updated.
         path: For messages, as line and column.
     """
     text = cell.strip().replace("\N{MINUS SIGN}", "-")

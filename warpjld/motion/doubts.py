@@ -1,4 +1,4 @@
-"""What looks wrong in a recorded motion, and what of it a rig does not follow: warnings for every command."""
+"""Warnings about recorded motions: implausible jumps, and movements that the rig does not follow."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from warpjld.skeleton.recognise.names import read_name
 __all__ = ["doubts_of_clip", "doubts_of_own_joints", "jumps"]
 
 _JUMP = 90.0
-"""Degrees from one sample to the next above which a joint hardly turned by itself: 2700° a second at 30 samples."""
+"""Smallest rotation [°] between samples that counts as a jump: 2700° a second at 30 samples a second."""
 
 _MOVES = 5.0
-"""Degrees that a joint turns by, to its parent, above which it is moved and not only kept in place."""
+"""Smallest rotation [°] relative to the parent at which a joint counts as moved."""
 
 _SHIFTS = 0.01
-"""Of the size of the figure, by which a joint moves from its parent, for the same."""
+"""Smallest translation relative to the parent, per size of the figure, at which a joint counts as moved."""
 
-_SHOWN = 4  # joints named in one line
+_SHOWN = 4  # joints named in one message
 
 
 def jumps(names: Sequence[str], turns: NDArray[np.float64]) -> list[str]:
-    """Joints that turn by more than 90° from one sample to the next, each with its widest, and where.
+    """Warnings about joints that turn by more than 90° between samples, each with the largest jump and its frame.
 
     Args:
-        names: Of the joints.
-        turns: Rotations to their parents at all samples, unit quaternions, shape (F, J, 4).
+        names: Names of the joints.
+        turns: Rotations relative to their parents at all samples, unit quaternions, shape (F, J, 4).
     """
     if len(turns) < 2:
         return []
@@ -51,13 +51,13 @@ def jumps(names: Sequence[str], turns: NDArray[np.float64]) -> list[str]:
 
 
 def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
-    """What a clip moves and nothing in the rig follows: one line at most.
+    """Warning, if any, about joints that a clip moves and that nothing in the rig follows.
 
-    A single frame is compared with the rest, others with their first.
+    A single frame is compared with the rest pose, several with the first of them.
 
     Args:
         clip: The recording.
-        used: Its joints that drive a joint of the rig, or carry one that does.
+        used: Indices of its joints that drive a joint of the rig, or are ancestors of one that does.
     """
     size = float(np.linalg.norm(np.ptp(clip.positions[0], axis=0)))
     if len(clip) == 1:
@@ -80,7 +80,7 @@ def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
 
 
 def doubts_of_own_joints(clip: Clip, followed: Collection[str]) -> list[str]:
-    """What an animation of a rig's own joints moves and the rig does not follow.
+    """Warning, if any, about what an animation of the rig's own joints moves and the rig does not follow.
 
     Args:
         clip: The animation.
@@ -101,7 +101,7 @@ def _degrees_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names, those that only count up as ``Thumb1…Thumb3``; the first few, and how many more."""
+    """Names as a list, numbered ones as a range ``Thumb1…Thumb3``: the first few, then how many more."""
     runs: list[list[str]] = []
     for name in names:
         if runs and re.sub(r"\d", "", runs[-1][-1]) == re.sub(r"\d", "", name):

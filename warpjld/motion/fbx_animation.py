@@ -13,16 +13,16 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["fbx_animation_names", "read_fbx_animation"]
 
-_FLAT = 1e-12  # determinant over largest entry cubed
+_FLAT = 1e-12  # largest determinant of a singular matrix, per cube of its largest entry
 _TINY = 1e-7
-"""What stands for zero scale."""
+"""Scale that replaces zero scale."""
 
 
 def fbx_animation_names(path: str | Path) -> tuple[str, ...]:
-    """Names of the animations of an FBX file that move something, in its order.
+    """Names of an FBX file's animations that move something, in the file's order.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: The file cannot be read.
         MissingExtraError: Without ufbx.
     """
     from warpjld.io.fbx.scene import read_scene
@@ -33,17 +33,17 @@ def fbx_animation_names(path: str | Path) -> tuple[str, ...]:
 def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str | None = None) -> JointAnimation:
     """An animation of an FBX file, in metres and Y up.
 
-    Its layers are blended, and rotation orders, pre- and post-rotations and pivots applied, by ufbx. The first frame
-    is where the animation starts, the last where it ends.
+    Layers, rotation orders, pre- and post-rotations and pivots are evaluated by ufbx. Frames run from the start to the
+    end of the animation.
 
     Args:
         path: The file.
         rate: Frames a second; None for the file's own.
-        name: Which animation, in any case, with or without the object's name that Blender puts before it and a bar;
+        name: Name of the animation, in any case, with or without the object name and bar that Blender puts before it;
             None for the first that moves anything.
 
     Raises:
-        InputError: It cannot be read, has no joints, or no such animation.
+        InputError: The file cannot be read, or has no joints or no such animation.
         MissingExtraError: Without ufbx.
     """
     from warpjld.io.fbx.scene import read_scene
@@ -71,7 +71,7 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
 
 
 def _turn_flat_ones(worlds: NDArray[np.float64], tree: SourceTree) -> list[str]:
-    """Give joints that are scaled to nothing the rotation they had before, in place; which, for people to read."""
+    """Replace singular transforms by the joint's previous rotation with a tiny scale, in place; returns warnings."""
     linear = worlds[..., :3, :3]
     flat = np.abs(np.linalg.det(linear)) <= _FLAT * np.abs(linear).max(axis=(-1, -2)) ** 3
     notes: dict[int, str] = {}

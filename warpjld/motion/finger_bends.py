@@ -1,7 +1,7 @@
-"""How far the fingers of a recording bend at each knuckle, and what that says: which hand it is, and whether it can be.
+"""Bend angles of a recording's fingers, and the side and plausibility of the hand that follow from them.
 
-A finger bends to the palm and hardly to the back of the hand. Seen as the other hand, the same joint positions bend by
-the same angles of the opposite sign: the hand on which no finger bends beyond its limits is the one recorded.
+A finger bends to the palm and hardly to the back of the hand. Taken as the other hand, the same joint positions give
+bends of opposite sign: the recorded hand is the one whose fingers stay within their limits.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ FINGERS = ("index", "middle", "ring", "pinky")
 BENDING = ("base", "knuckle2", "knuckle3")
 
 _LEAST = default_limits([f"index.{joint}" for joint in BENDING])[:, 0, 0]
-"""Smallest flexions [rad] of a finger's joints: its base goes back by 45°, the others are straight at most."""
+"""Smallest flexions [rad] of a finger's joints: the base extends by up to 45°, the others not beyond straight."""
 _TOLERANCE = np.radians(15.0)
-"""Trackers err by so much, and people's joints give: bends back beyond a limit by less say nothing."""
+"""Allowance for tracking errors and joint laxity: smaller violations of a limit are ignored."""
 _TELLING = np.radians(20.0)
-"""Bends beyond the limits, over all joints and frames, from which they tell one hand from the other."""
+"""Smallest difference of violations, summed over joints and frames, that decides a hand's side."""
 _STRAIGHT = np.radians(20.0)
-"""Mean bend that tells as much of a hand's side as a thumb one palm's width before the palm."""
+"""Mean bend that weighs as much for a hand's side as a thumb one palm's width in front of the palm."""
 _HEEL = {"wrist", "thumb.base", *(f"{finger}.carpometacarpal" for finger in FINGERS)}
-"""Joints at the near end of the palm: where a recording has no wrist, the others stand for it."""
+"""Joints at the proximal end of the palm, which replace a missing wrist."""
 _LEANS = 0.15
-"""Score from which thumb and slight bends tell the side of a flat hand."""
+"""Smallest absolute score at which thumb and slight bends decide the side of a flat hand."""
 
 
 def finger_bends(points: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Bends [rad] of base, second and third knuckle of index to pinky, shape (K, 4, 3), as of a right hand.
+    """Bends [rad] of base, knuckle2 and knuckle3 of index to pinky, shape (K, 4, 3), for a right hand.
 
-    Positive is to the palm of a right hand, so that a left hand's bends are the negative of these. The first bone of a
-    finger is compared to its metacarpal (or to the line from the wrist), the others to the bone before; the axis starts
-    across the palm and turns with the bones by minimal rotations. Joints that a recording lacks do not bend.
+    Positive is towards the palm of a right hand; the bends of a left hand are the negatives. The first bone of a finger
+    is compared with its metacarpal (or the line from the wrist), each other bone with the one before; the axis starts
+    across the palm and is transported along the bones by minimal rotations. Missing joints have bends of 0.
 
     Args:
-        points: Joint without its side, such as ``index.base`` → its positions, shape (K, 3).
+        points: Joint name without side, such as ``index.base`` → its positions, shape (K, 3).
     """
     if not _spanned(points):
         return np.zeros((len(next(iter(points.values()))), len(FINGERS), len(BENDING)))
@@ -68,15 +68,15 @@ def finger_bends(points: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float6
 
 
 def bent_beyond_limits(bends: NDArray[np.float64], side: str) -> NDArray[np.float64]:
-    """How far [rad] joints of a ``left`` or ``right`` hand bend back beyond limit and tolerance, 0 or more."""
+    """Excess [rad] of extension over limit and tolerance for a ``left`` or ``right`` hand, at least 0."""
     flexion = bends if side == "right" else -bends
     return np.asarray(np.maximum(_LEAST - _TOLERANCE - flexion, 0.0))
 
 
 def bending_side(bends: NDArray[np.float64]) -> str | None:
-    """The hand whose flexions are the possible ones over all frames; None where both are, or neither.
+    """The hand whose flexions are plausible over all frames; None where both are, or neither.
 
-    As the other one, at least two joints must bend beyond their limits: a single one may be a tracker's slip.
+    At least two joints of the other hand must exceed their limits: a single one may be a tracking error.
     """
     left, right = bent_beyond_limits(bends, "left"), bent_beyond_limits(bends, "right")
     worse = left if left.sum() > right.sum() else right
@@ -86,9 +86,9 @@ def bending_side(bends: NDArray[np.float64]) -> str | None:
 
 
 def leaning(points: Mapping[str, NDArray[np.float64]], bends: NDArray[np.float64]) -> str | None:
-    """The hand that an all but flat one looks like: fingers rest slightly bent, and the thumb lies before the palm.
+    """The probable side of a nearly flat hand: fingers rest slightly bent, and the thumb lies in front of the palm.
 
-    None where neither is to be seen, as in a hand laid on a table: it is its own mirror image.
+    None where neither is visible, as in a hand laid on a table, which is its own mirror image.
     """
     if not _spanned(points):
         return None
@@ -111,7 +111,8 @@ def _spanned(points: Mapping[str, NDArray[np.float64]]) -> bool:
 def _palm(
     points: Mapping[str, NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of every frame: where the hand begins, its direction to the thumb's side, and the normal: a right hand's back."""
+    """Per frame: the palm's proximal end, the direction to the thumb's side, and the normal (dorsal for a right
+    hand)."""
     heel = points.get("wrist", np.mean([points[name] for name in sorted(_HEEL & points.keys())], axis=0))
     bases = np.mean([points[name] for finger in FINGERS if (name := f"{finger}.base") in points], axis=0)
     forward = unit(bases - heel)

@@ -1,4 +1,4 @@
-"""Frames in which a tracker lost a hand: they are interpolated, and said."""
+"""Notes on frames in which a tracker lost a hand; these frames are interpolated."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ __all__ = ["bridged"]
 
 
 def bridged(what: str, frames: Sequence[int]) -> tuple[str, ...]:
-    """A note of the frames missing between the first and the last given one; none where none is.
+    """A note about frames missing between the first and the last given one; empty if none is missing.
 
     Args:
-        what: What is missing there.
-        frames: Numbers of the frames that there are, increasing.
+        what: What was not tracked, for the note.
+        frames: Numbers of the frames with data, increasing.
     """
     steps = np.diff(np.asarray(frames, dtype=np.int64))
     lost = int((steps - 1).sum()) if len(steps) else 0

@@ -27,16 +27,16 @@ else:
 
 __all__ = ["gltf_animation_names", "read_gltf_animation"]
 
-_PATHS = {"translation": 3, "rotation": 4, "scale": 3}  # numbers a key
+_PATHS = {"translation": 3, "rotation": 4, "scale": 3}  # components of a value
 _OTHER_PATHS = {"weights": "morph targets", "pointer": "properties that are no joint's"}
 _SINGLE = float(np.finfo(np.float32).eps)
 
 
 def gltf_animation_names(path: str | Path) -> tuple[str, ...]:
-    """Names of a glTF file's animations, each once.
+    """Names of a glTF file's animations, without repetition.
 
     Raises:
-        InputError: No glTF.
+        InputError: Not a glTF file.
     """
     from warpjld.io.gltf.animation_list import list_animations
     from warpjld.io.gltf.document import open_document
@@ -52,10 +52,10 @@ def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: st
     Args:
         path: A .gltf or .glb file with an animation.
         rate: Frames a second; None for the spacing of the file's keys, see ``frame_rate``.
-        name: Which animation, in any case; None for the first.
+        name: Name of the animation, in any case; None for the first.
 
     Raises:
-        InputError: No glTF, no animation, none of that name, or broken samplers.
+        InputError: Not a glTF file, no animation, none of that name, or invalid samplers.
     """
     from warpjld.io.gltf.animation_list import list_animations
     from warpjld.io.gltf.document import open_document
@@ -81,7 +81,7 @@ def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: st
 
 
 def _sample(document: Document, keys: list[_Keys], rate: float | None) -> tuple[NDArray[np.float64], float, list[str]]:
-    """World transforms of all nodes, shape (F, N, 4, 4), frames a second, and where scale mirrors."""
+    """World transforms of all nodes, shape (F, N, 4, 4), frames a second, and warnings about mirroring scale."""
     if not keys:
         raise InputError("its animation moves no joint", path=document.path)
     times = merged_times(np.concatenate([key.times for key in keys]))
@@ -97,7 +97,7 @@ def _sample(document: Document, keys: list[_Keys], rate: float | None) -> tuple[
 
 
 class _Keys:
-    """Keys of one property of one node."""
+    """Keys of one animated property of a node."""
 
     def __init__(self, document: Document, sampler: Any, node: int, path: str) -> None:
         self.node, self.path = node, path
@@ -115,13 +115,13 @@ class _Keys:
             raise InputError(f"{where}: key times must increase, and all be finite", path=document.path)
         if path == "rotation" and not (np.linalg.norm(values[per_key // 2 :: per_key], axis=1) > 0.0).all():
             raise InputError(f"{where}: a key is no rotation: its quaternion is zero", path=document.path)
-        # of keys that float32 moved to one time the last counts
+        # of keys at one time after rounding to float32 the last is kept
         last = np.append(np.diff(self.times) > 0.0, True)
         self.values = values.reshape(len(self.times), per_key, _PATHS[path])[last]
         self.times = self.times[last]
 
     def __call__(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at times, shape (F, 3) or (F, 4); held outside the keys."""
+        """Values at times, shape (F, 3) or (F, 4); constant outside the keys."""
         values = self.values[:, self.values.shape[1] // 2]
         rotation = self.path == "rotation"
         if rotation and self.mode != "CUBICSPLINE":
@@ -130,7 +130,7 @@ class _Keys:
         if len(self.times) == 1:
             out = np.repeat(values, len(at), axis=0)
         elif self.mode == "STEP":
-            # keys are rounded to float32: a frame on a key must not fall before it
+            # key times are rounded to float32: a frame on a key must not be taken as before it
             rounding = 2.0 * _SINGLE * np.abs(self.times).max()
             out = values[np.maximum(np.searchsorted(self.times - rounding, at, side="right") - 1, 0)]
         elif self.mode == "CUBICSPLINE":
@@ -156,7 +156,7 @@ class _Keys:
 
 
 def _read_channels(document: Document, animations: list[Any]) -> tuple[list[_Keys], list[str]]:
-    """Keys of all joints, and what of the animations is not followed."""
+    """Keys of all nodes, and warnings about animated properties that are ignored."""
     keys: dict[tuple[int, str], _Keys] = {}
     left_out: dict[str, None] = {}
     for animation in animations:
@@ -174,8 +174,8 @@ def _read_channels(document: Document, animations: list[Any]) -> tuple[list[_Key
 def _worlds(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:
     """World transforms of all nodes, shape (F, N, 4, 4), as ``JointAnimation.worlds`` has them, and warnings.
 
-    Places are those of the file. Where scale turns negative that was not so at rest, axes are those of its amount: no
-    rotation says which way a mirrored joint points.
+    Positions are those of the file. Where a scale becomes negative that was not so at rest, axes are computed with
+    its sign at rest, since a mirrored frame is no rotation.
     """
     count = len(document.gltf.nodes)
     by_node: dict[int, dict[str, _Keys]] = {}
@@ -222,8 +222,8 @@ def _parents_first(document: Document) -> list[int]:
 def _animated(
     document: Document, node: int, keys: dict[str, _Keys], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[NDArray[np.float64], int] | None]:
-    """Transforms of a node relative to its parent, shape (F, 4, 4); where its scale changes sign, its linear parts
-    without, shape (F, 3, 3), and the first such frame."""
+    """Transforms of a node relative to its parent, shape (F, 4, 4); if its scale changes sign, also the linear parts
+    without the change of sign, shape (F, 3, 3), and the first such frame."""
     fixed = dict(zip(_PATHS, document.parts(node), strict=True))
     values = {p: keys[p](at) if p in keys else np.tile(fixed[p], (len(at), 1)) for p in _PATHS}
     turn = transform.Rotation.from_quat(values["rotation"]).as_matrix()

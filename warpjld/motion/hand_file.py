@@ -1,4 +1,4 @@
-"""Recordings of hands, JSON and NumPy arrays: read, and told apart."""
+"""Reader of hand recordings in JSON and NumPy files; the format is detected from the content."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ __all__ = ["read_hands"]
 
 
 def read_hands(path: str | Path, *, rate: float | None = None, flat_hand_mean: bool | None = None) -> HandRecording:
-    """Read a recording of one hand or two: WebXR poses, Leap Motion frames, MediaPipe landmarks or MANO parameters.
+    """Read a recording of one or two hands: WebXR poses, Leap Motion frames, MediaPipe landmarks or MANO parameters.
 
     Args:
         path: A ``.json``, ``.npz`` or ``.npy`` file.
-        rate: Frames a second, where the file does not say: 30 if left out.
-        flat_hand_mean: Whether no rotation of MANO's means the flat hand, where the file does not say.
+        rate: Frames a second if the file does not state it; 30 by default.
+        flat_hand_mean: Whether zero rotations of MANO mean the flat hand, if the file does not state it.
 
     Raises:
-        InputError: Unreadable, or none of these.
+        InputError: Unreadable, or none of these formats.
     """
     path = Path(path)
     content = read_json(path) if path.suffix.lower() == ".json" else read_arrays(path)

@@ -1,4 +1,4 @@
-"""What every recording of a hand gives a rig: which hand it is, how its fingers bend, how the rig's joints turn."""
+"""Common interface of hand recordings: side, finger bends, and joint rotations for a rig."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class HandTurns:
-    """How one recorded hand turns the J joints of a rig, K times.
+    """Rotations of a rig's J joints by one recorded hand, at K times.
 
     Attributes:
-        joints: Joints of the rig that are this hand's.
-        local: Rotations relative to the parent's bone, identity beyond the hand, shape (K, J, 4).
-        root: Rotation of a rig that is just this hand, shape (K, 4).
+        joints: Joints of the rig that belong to the hand.
+        local: Rotations relative to the parent's bone, identity for all other joints, shape (K, J, 4).
+        root: Rotation of the root of a rig that consists of this hand, shape (K, 4).
         displacement: Displacement [m] of such a rig's root from rest, shape (K, 3).
-        moves: Whether the last two count.
+        moves: Whether ``root`` and ``displacement`` are known.
     """
 
     joints: tuple[int, ...]
@@ -36,11 +36,11 @@ class HandTurns:
 
 
 class HandMotion(Protocol):
-    """A recorded hand of any kind: ``HandTrack`` knows where its joints are, ``ManoTrack`` how they turn."""
+    """A recorded hand: ``HandTrack`` holds joint positions, ``ManoTrack`` joint rotations."""
 
     @property
     def side(self) -> str | None:
-        """``left`` or ``right``; None where the file does not say."""
+        """``left`` or ``right``; None if the file does not state it."""
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -48,38 +48,38 @@ class HandMotion(Protocol):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What the file calls each time; empty for frame numbers."""
+        """The file's name of each time, for messages; empty for frame numbers."""
 
     @property
     def may_be_mirrored(self) -> bool:
-        """Whether the recording may be a mirror image of the hand it states."""
+        """Whether the recording may be a mirror image of the stated hand."""
 
     @property
     def bends(self) -> NDArray[np.float64]:
-        """Bends [rad] of the fingers' joints as of a right hand, shape (K, 4, 3)."""
+        """Bends [rad] of the finger joints for a right hand, shape (K, 4, 3)."""
 
     @property
     def leaning(self) -> str | None:
-        """The side that a hand looks like whose bends do not tell."""
+        """Probable side of a hand whose bends are not conclusive."""
 
     def called(self, side: str) -> HandMotion:
-        """The same numbers, taken for those of a hand of this side."""
+        """The same data, taken as those of a hand of this side."""
 
     def mirrored(self) -> HandMotion:
-        """The other hand doing the same."""
+        """The mirror image: the other hand with the same motion."""
 
     def turns(self, skeleton: Skeleton) -> HandTurns:
-        """How the joints of a rig's hand of the same side turn."""
+        """Rotations of the joints of a rig's hand of the same side."""
 
 
 @dataclass(frozen=True, eq=False)
 class HandRecording:
-    """What a file holds of one hand or two.
+    """Content of a recording of one or two hands.
 
     Attributes:
-        hands: The hands, at most one of a side; a hand whose side is not known is alone.
+        hands: The hands, at most one per side; a hand of unknown side is the only one.
         rate: Frames a second.
-        notes: What was assumed or bridged, for people to read.
+        notes: Assumptions and interpolated gaps, for the user.
         warnings: What looks wrong.
     """
 
@@ -90,20 +90,20 @@ class HandRecording:
 
 
 def hand_joints(skeleton: Skeleton, side: str | None) -> dict[str, int]:
-    """Joints of a rig's hand by their names without the side."""
+    """Joint indices of a rig's hand, by names without the side."""
     return {name.partition(".")[2]: j for j, name in enumerate(skeleton.names) if name.startswith(f"{side}.")}
 
 
 def root_carried(
     skeleton: Skeleton, turn: NDArray[np.float64], centre: NDArray[np.float64], moved: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotation of the root, and its displacement [m], that turn a rig about a point and move that point.
+    """Rotation and displacement [m] of a rig's root that rotate the rig about a point and move that point.
 
     Args:
-        skeleton: The rig's.
+        skeleton: The rig's skeleton.
         turn: Rotations, shape (K, 4).
         centre: The point at rest [m], shape (3,).
-        moved: Where it goes from there [m], shape (K, 3).
+        moved: Displacement of the point [m], shape (K, 3).
     """
     arm = centre - skeleton.rest[0]
     return turn, arm + moved - rotate(turn, arm)

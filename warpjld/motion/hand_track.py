@@ -1,4 +1,4 @@
-"""A tracked hand, joint positions only, drives a rig's hand."""
+"""Retargeting of a tracked hand, given by joint positions only, to a rig's hand."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ __all__ = ["HandTrack"]
 
 _PALM = ("wrist", *(f"{digit}.{joint}" for digit in DIGITS for joint in ("carpometacarpal", "base")))
 _FARTHEST = 1e9
-"""Coordinates beyond this in any unit of length are mistakes, and their squares too large for sums."""
+"""Largest plausible coordinate in any unit of length; squares of larger ones could overflow."""
 _THIN = 0.01
-"""Width of a palm relative to its length below which it does not tell how the hand is turned."""
+"""Ratio of a palm's width to its length below which its orientation is undetermined."""
 _MOBILE = ("ring.base", "pinky.base")
-"""Palm points that the mobile metacarpals carry (R8): left out of the palm's fit where enough others are known."""
+"""Palm points moved by the mobile metacarpals (R8): left out of the palm's fit where enough others are known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +39,12 @@ class HandTrack:
     """Positions of a hand's joints at K times.
 
     Attributes:
-        side: ``left`` or ``right``; None where the file does not say.
+        side: ``left`` or ``right``; None if the file does not state it.
         times: Times [s], increasing, shape (K,).
         points: Joint, such as ``index.base`` → its positions in any unit, shape (K, 3).
-        moves: Whether the hand's place and orientation count, or its fingers only.
-        may_be_mirrored: Whether the positions may be a mirror image, as those seen by a selfie camera are.
-        labels: What the file calls each time, for messages; empty for ``frame 0`` and so on.
+        moves: Whether the hand's position and orientation are meaningful, or only its fingers.
+        may_be_mirrored: Whether the positions may be a mirror image, as those of a selfie camera are.
+        labels: The file's name of each time, for messages; empty for ``frame 0`` and so on.
     """
 
     side: str | None
@@ -65,34 +65,33 @@ class HandTrack:
 
     @cached_property
     def bends(self) -> NDArray[np.float64]:
-        """Bends [rad] of the fingers' joints as of a right hand, shape (K, 4, 3), see ``finger_bends``."""
+        """Bends [rad] of the finger joints for a right hand, shape (K, 4, 3), see ``finger_bends``."""
         return finger_bends(self.points)
 
     @property
     def leaning(self) -> str | None:
-        """The side that a hand looks like whose bends do not tell."""
+        """Probable side of a hand whose bends are not conclusive."""
         return leaning(self.points, self.bends)
 
     def called(self, side: str) -> HandTrack:
-        """The same positions, taken for those of a hand of this side."""
+        """The same positions, taken as those of a hand of this side."""
         return replace(self, side=side)
 
     def mirrored(self) -> HandTrack:
-        """The other hand doing the same."""
+        """The mirror image: the other hand with the same motion."""
         points = {name: place * np.array([-1.0, 1.0, 1.0]) for name, place in self.points.items()}
         return replace(self, side="right" if self.side == "left" else "left", points=points)
 
     def turns(self, skeleton: Skeleton) -> HandTurns:
-        """How the joints of a rig's hand of the same side turn.
+        """Rotations of the joints of a rig's hand of the same side.
 
-        The palms are laid upon one another by the least-squares rotation of wrist, metacarpals and finger bases. Then
-        every phalanx turns, in its parent's frame, by the smallest rotation that gives it the tracked direction:
-        without twist about itself, so that knuckles keep their flexion axes. Bone lengths are the rig's. Where a
-        recording has metacarpals, the ring's and the pinky's flex within their limits; index and middle are fixed to
-        the wrist.
+        The palms are aligned by the least-squares rotation of wrist, metacarpals and finger bases. Then every phalanx
+        is rotated in its parent's frame by the minimal rotation to the tracked direction, without twist about itself,
+        so that knuckles keep their flexion axes. Bone lengths are the rig's. If the recording has metacarpals, those of
+        ring and pinky flex within their limits; index and middle are fixed to the wrist.
 
         Raises:
-            InputError: The track has too few joints.
+            InputError: The track has fewer than four joints of the palm, or these are collinear.
         """
         own = hand_joints(skeleton, self.side)
         palm = [name for name in _PALM if name in own and name in self.points]
@@ -118,7 +117,7 @@ class HandTrack:
 
 
 def _fit(rest: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Least-squares rotations of the rest points onto the places (Kabsch), and how much larger the places are."""
+    """Least-squares rotations of the rest points onto the places (Kabsch), and the scale of the places."""
     a = rest - rest.mean(axis=0)
     b = places - places.mean(axis=1, keepdims=True)
     u, _, vt = np.linalg.svd(np.einsum("fpi,pj->fij", b, a))
@@ -136,7 +135,7 @@ def _drive_digit(
     to_rest: NDArray[np.float64],
     local: NDArray[np.float64],
 ) -> None:
-    """Fill in the local rotations of one digit, from the wrist outwards."""
+    """Set the local rotations of one digit, from the wrist outwards, in ``local``."""
     turned = np.tile(IDENTITY, (len(track.times), 1))
     for joint, following in _pairs(digit):
         if not {joint, following} <= own.keys() or not {joint, following} <= track.points.keys():
@@ -161,9 +160,9 @@ def _pairs(digit: str) -> list[tuple[str, str]]:
 def _flex(
     skeleton: Skeleton, joint: int, bone: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Rotation about the flexion axis, within the limits, that brings a bone nearest to the wanted direction."""
+    """Rotation about the flexion axis, within the limits, that brings a bone closest to the wanted direction."""
     axis = skeleton.axes[joint]
     a, b = bone - axis * (axis @ bone), wanted - np.outer(wanted @ axis, axis)
-    limits = skeleton.limits[joint, 0] - skeleton.initial[joint, 0]  # as the angle, from rest
+    limits = skeleton.limits[joint, 0] - skeleton.initial[joint, 0]  # relative to the rest pose, as the angle is
     angle = np.arctan2(np.cross(a, b) @ axis, b @ a).clip(*limits)
     return np.concatenate([np.sin(angle / 2.0)[:, None] * axis, np.cos(angle / 2.0)[:, None]], axis=-1)

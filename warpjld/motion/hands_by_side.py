@@ -1,4 +1,4 @@
-"""Hands that stand under their side in a frame, as MediaPipe's holistic landmarker gives them."""
+"""Hands stored under keys of their side in a frame, as by MediaPipe's holistic landmarker."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 __all__ = ["hands_by_side"]
 
 _KEY = re.compile(r"(left|right)(hand)?(world)?(landmarks)?")
-_COUNT = 21  # landmarks of one hand: the wrist, and four a digit
+_COUNT = 21  # landmarks of one hand: the wrist, and four per digit
 
 
 def hands_by_side(frame: Any) -> list[dict[str, Any]] | None:
     """Hands of a frame such as ``{"left_hand_landmarks": […], "rightHandLandmarks": null}``.
 
-    World landmarks come before others. Lists of one hand in a list, which the tasks write, are that hand.
+    World landmarks are preferred. A list of one hand inside a list, as MediaPipe Tasks write it, is accepted.
 
     Returns:
-        ``landmarks`` or ``world_landmarks``, and ``handedness``, of each hand that was seen; None where the frame has
-        no such keys, or they hold something else.
+        ``landmarks`` or ``world_landmarks``, and ``handedness``, of each visible hand; None where the frame has no such
+        keys, or these hold something else.
     """
     if not isinstance(frame, Mapping):
         return None

@@ -1,4 +1,4 @@
-"""Recorded hands drive a rig: which recording moves which hand, and when a recording cannot be what it is taken for."""
+"""Retargeting of hand recordings to a rig: choice of hands, and plausibility checks."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ __all__ = ["poses_of_hands"]
 
 _SIDES = ("left", "right")
 _MOST_JOINTS = 3
-"""A quarter of the fingers' twelve joints: one or two bent back for long are someone's supple last knuckles."""
-_MOST_FRAMES = 0.25  # share of frames in which a joint may be beyond its limits
+"""A quarter of the fingers' twelve joints: one or two with much extension may be due to lax distal joints."""
+_MOST_FRAMES = 0.25  # largest share of frames in which a joint may be beyond its limits
 _FAR = np.radians(30.0)
-"""No joint gives by so much more than trackers err."""
+"""Violation that exceeds tracking errors and joint laxity."""
 
 
 def poses_of_hands(
     hands: tuple[HandMotion, ...], skeleton: Skeleton, rate: float, *, side: str | None = None
 ) -> tuple[Poses, tuple[str, ...], tuple[str, ...]]:
-    """Poses of a rig whose hands follow recorded ones, by side; one hand follows one of the other side mirrored.
+    """Poses of a rig whose hands follow recorded hands of the same side; a single one of the other side is mirrored.
 
-    A rig that is just a hand, with a forearm or without, starts where it rests and from there moves as a whole with
-    the recorded palm, seen from the palm's first orientation; other skeletons move their fingers only. Times before
-    the first and after the last of one of two hands hold its pose.
+    A rig that consists of a hand, with or without a forearm, starts at rest and then moves as a whole with the
+    recorded palm, relative to the palm's first orientation; of other skeletons only the fingers move. Where two hands
+    were recorded for different times, each holds its first and last pose.
 
     Args:
-        hands: What was recorded.
-        skeleton: What is driven.
+        hands: The recorded hands.
+        skeleton: Skeleton to pose.
         rate: Frames a second of the result.
-        side: Which hand a recording of one is of, whatever its file says; of two, the one to follow.
+        side: Side of a single recorded hand, overriding its file; of two hands, the one to use.
 
     Returns:
-        The poses, notes of what drives what, and warnings of what looks wrong.
+        The poses, notes on which hand drives which, and warnings.
 
     Raises:
-        InputError: The rig has no hand, nothing tells which hand was recorded, or its fingers would bend backwards.
+        InputError: The rig has no hand, the recorded hand's side is unknown, or its fingers would bend backwards.
     """
     own = [one for one in _SIDES if f"{one}.wrist" in skeleton.names]
     if not own:
@@ -80,7 +80,7 @@ def _just_a_hand(skeleton: Skeleton, side: str | None) -> bool:
 
 
 def _sided(hand: HandMotion, own: list[str], side: str | None, notes: list[str], warnings: list[str]) -> HandMotion:
-    """A hand with its side: the one given, else stated, else the one on which its fingers bend as fingers do."""
+    """A hand with its side: as given, else as stated, else the one for which its finger bends are plausible."""
     bent = bending_side(hand.bends)
     if side is not None:
         if hand.side not in (None, side):
@@ -120,7 +120,7 @@ def _sided(hand: HandMotion, own: list[str], side: str | None, notes: list[str],
 
 
 def _followed(hands: list[HandMotion], own: list[str], side: str | None, notes: list[str]) -> list[HandMotion]:
-    """The recorded hands that the rig's follow."""
+    """The recorded hands that are used."""
     if len(hands) > 1 and side is not None:
         hands = [hand for hand in hands if hand.side == side]
         if not hands:
@@ -134,13 +134,13 @@ def _followed(hands: list[HandMotion], own: list[str], side: str | None, notes: 
 
 
 def _check_bends(hand: HandMotion, *, given: bool) -> tuple[str, ...]:
-    """Refuse fingers that bend to the back of the hand; warn of single joints that do, as trackers err.
+    """Reject hands with fingers bent backwards; warn of single joints that are, as tracking errs.
 
-    Refused is a recording whose fingers would bend better as the other hand's, and one in which for a quarter of the
-    time at least three of the twelve joints bend back beyond their limits and 15° more, or one does and 45° more.
+    A recording is rejected if its finger bends are plausible for the other hand, or if in a quarter of the frames at
+    least three of the twelve joints violate their limits by more than 15°, or one by more than 45°.
 
     Raises:
-        InputError: Such a recording: names the joint that is worst, its frame and angle.
+        InputError: Such a recording, with its worst joint, frame and angle.
     """
     side = hand.side or ""
     excess = bent_beyond_limits(hand.bends, side)

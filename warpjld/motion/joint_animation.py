@@ -1,4 +1,4 @@
-"""An animation as a file with rigs states it: a world transform for every joint and frame."""
+"""Animation of a joint tree by world transforms of every joint and frame."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class JointAnimation:
             mirrored where they were not at rest (see ``warpjld.geometry.scales``), so that every frame has a rotation.
         rate: Frames a second.
         title: The animation's name; "" where the file gives none.
-        notes: What a reader of the result should know.
-        warnings: What of the file cannot be followed.
-        up: The file's up axis, ``y`` or ``z``, where it says so.
+        notes: Information for the user of the result.
+        warnings: What of the file is ignored.
+        up: The file's up axis, ``y`` or ``z``; None if it does not state one.
     """
 
     tree: SourceTree
@@ -50,9 +50,9 @@ class JointAnimation:
         return len(self.worlds)
 
     def clip(self) -> Clip:
-        """The same as positions and rotations from rest, parents first: what another skeleton is driven by.
+        """The animation as positions and rotations from rest, parents first, for retargeting.
 
-        Of a file that says it has Z up it is turned to Y.
+        Rotated to Y up if the file states Z up.
         """
         order = np.array(sorted(range(len(self.tree)), key=lambda j: (self.tree.depth(j), j)))
         place = np.empty_like(order)

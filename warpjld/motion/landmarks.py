@@ -1,4 +1,4 @@
-"""Landmarks of hands and bodies: which joint is which, in a recording and in a rig, and where its bone points."""
+"""Landmarks for retargeting: canonical joints of a recording or a rig, and the bones between them."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _NEXT = {"clavicle": "shoulder", "shoulder": "elbow", "elbow": "wrist", "hip": "
 _TOWARDS_FINGERS = ("middle.base", "ring.base", "index.base", "pinky.base")
 _LIMBS = (".clavicle", ".shoulder", ".elbow", ".wrist", ".hip", ".knee", ".ankle", ".ball")
 _NO_LENGTH = 1e-6
-"""Of the figure's size."""
+"""Bone length that counts as zero, per size of the figure."""
 _ONE_LINE = 0.02
-"""Sine up to which offsets count as parallel: such a rest says nothing of where joints lie."""
+"""Largest sine at which offsets count as parallel; a rest pose on one line does not give joint positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +31,11 @@ class Landmarks:
     """Canonical names → joints of a tree.
 
     Attributes:
-        joints: Canonical name, such as ``left.elbow`` or ``right.index.base``, → joint number.
+        joints: Canonical name, such as ``left.elbow`` or ``right.index.base``, → joint index.
         parents: Parent of every joint, -1 for a root.
         rest: Joint positions at rest, shape (J, 3).
-        notes: What was decided in recognising them.
-        doubts: What in it is probably wrong.
+        notes: Decisions of recognition.
+        doubts: Probable errors of recognition.
     """
 
     joints: dict[str, int]
@@ -46,13 +46,13 @@ class Landmarks:
 
     @property
     def pelvis(self) -> int | None:
-        """Where the legs meet; without legs the joint whose name says so."""
+        """Common ancestor of the legs; without legs the joint named pelvis."""
         met = self._meeting("left.hip", "right.hip")
         return met if met is not None or self._any("hip") else self.joints.get("pelvis")
 
     @property
     def chest(self) -> int | None:
-        """Where the arms meet; without arms the uppermost vertebra."""
+        """Common ancestor of the arms; without arms the uppermost vertebra."""
         met = self._meeting("left.shoulder", "right.shoulder")
         if met is not None or self._any("shoulder"):
             return met
@@ -60,7 +60,7 @@ class Landmarks:
         return max(spine, key=lambda j: len(self.path(-1, j)), default=None)
 
     def path(self, start: int, end: int) -> tuple[int, ...]:
-        """Joints below ``start`` down to ``end``; empty where ``end`` is not below it."""
+        """Joints below ``start`` down to ``end``; empty where ``end`` is not a descendant of it."""
         out: list[int] = []
         joint = end
         while joint >= 0 and joint != start:
@@ -69,18 +69,18 @@ class Landmarks:
         return tuple(reversed(out)) if joint == start else ()
 
     def following(self, name: str) -> int | None:
-        """Joint that ends the segment a joint begins, further down the limb or digit; None at its end."""
+        """Joint at the far end of a joint's segment, along the limb or digit; None at its end."""
         side, _, part = name.partition(".")
         joint = self.joints.get(f"{side}.{_NEXT.get(part)}")
         return joint if joint is not None and self.path(self.joints[name], joint) else None
 
     def last_part(self, name: str) -> int:
-        """Joint that carries the end of a segment: itself, or the last of those which divide the segment."""
+        """Joint whose bone ends the segment: itself, or the last of the joints that subdivide the segment."""
         end = self.following(name)
         return self.joints[name] if end is None else int(self.parents[end])
 
     def bone(self, name: str) -> NDArray[np.float64] | None:
-        """Vector at rest from a joint to the next of its limb: a wrist to fingers, an ankle to toes."""
+        """Rest vector from a joint to the next of its limb: from a wrist to the fingers, from an ankle to the toes."""
         joint = self.joints[name]
         side, _, part = name.partition(".")
         if part == "wrist":
@@ -98,19 +98,19 @@ class Landmarks:
         return vector if np.linalg.norm(vector) > 0.0 else None
 
     def thumb_side(self, side: str) -> NDArray[np.float64] | None:
-        """Vector at rest from a wrist to its thumb."""
+        """Rest vector from a wrist to its thumb."""
         for joint in ("thumb.knuckle2", "thumb.tip"):
             if f"{side}.{joint}" in self.joints and f"{side}.wrist" in self.joints:
                 return np.asarray(self.rest[self.joints[f"{side}.{joint}"]] - self.rest[self.joints[f"{side}.wrist"]])
         return None
 
     def across(self, part: str, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Vector from a right joint such as the ``hip`` to the left one, of joint positions of shape (…, J, 3)."""
+        """Vector from a right joint such as the ``hip`` to the left one, for positions of shape (…, J, 3)."""
         ends = self.joints.get(f"left.{part}"), self.joints.get(f"right.{part}")
         return None if ends[0] is None or ends[1] is None else places[..., ends[0], :] - places[..., ends[1], :]
 
     def segment(self, part: str, end: str, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Unit vectors from a joint such as the ``hip`` to another, both sides', shape (2, …, 3), or None."""
+        """Unit vectors from a joint such as the ``hip`` to another, for both sides, shape (2, …, 3), or None."""
         names = [f"{side}.{joint}" for side in ("left", "right") for joint in (part, end)]
         if not self.joints.keys() >= set(names):
             return None
@@ -118,7 +118,7 @@ class Landmarks:
         return unit(np.stack([b - a, d - c]))
 
     def trunk(self, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Vector from the pelvis to the chest, or the head where they are one, of positions of shape (…, J, 3)."""
+        """Vector from the pelvis to the chest, or the head where these coincide, for positions of shape (…, J, 3)."""
         start = self.pelvis
         end = next((j for j in (self.chest, self.joints.get("head")) if j is not None and j != start), None)
         return None if start is None or end is None else places[..., end, :] - places[..., start, :]
@@ -141,7 +141,7 @@ class Landmarks:
 
 
 def landmarks_of_skeleton(skeleton: Skeleton) -> Landmarks:
-    """Landmarks of a rig's skeleton: its names are canonical already. A stub of forearm ends in an elbow's place."""
+    """Landmarks of a rig's skeleton, whose names are canonical. The root of a forearm without elbow stands for it."""
     joints = {name: j for j, name in enumerate(skeleton.names)}
     for side in ("left", "right"):
         if f"{side}.forearm" in joints:
@@ -150,11 +150,11 @@ def landmarks_of_skeleton(skeleton: Skeleton) -> Landmarks:
 
 
 def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:
-    """Landmarks of a recording, recognised as a rig's joints are: by names in any of the common conventions, or shape.
+    """Landmarks of a recording, recognised like a rig's joints: by names in any common convention, or by shape.
 
     Args:
         clip: The recording.
-        side: Side of a hand whose joints' names do not say it.
+        side: Side of a hand whose joint names do not state it.
     """
     from warpjld.skeleton.recognise.by_name import roles_by_name
     from warpjld.skeleton.recognise.recognise import recognise
@@ -172,18 +172,18 @@ def landmarks_of_clip(clip: Clip, *, side: str | None = None) -> Landmarks:
     for hand in roles.hands:
         joints |= {f"{hand.side or side}.{name}": joint for name, joint in hand.joints.items()}
     for name, joint in roles_by_name(tree).body.items():
-        # a wrist whose fingers make no hand is a wrist nevertheless: recordings often only hint at fingers
+        # a wrist without a complete hand is kept: recordings often have only some finger joints
         if name.endswith(_LIMBS) and name not in joints and joint not in joints.values():
             joints[name] = joint
     by_shape = ("the recording's joints are recognised by shape, not by name",) if roles.how == "shape" else ()
     joints = {name: kept[joint] for name, joint in joints.items()}
-    # what recognition advises, a map of joints, is for rigs
+    # the remedy that recognition suggests, a joint map, applies to rigs only
     doubts = tuple(f"in the recording, {doubt.partition('; if ')[0]}" for doubt in roles.suspicious)
     return Landmarks(joints, clip.parents, clip.rest, (*by_shape, *roles.notes), doubts)
 
 
 def _with_bones(clip: Clip, places: NDArray[np.float64]) -> list[int]:
-    """Joints but for those at the end of a bone without length: End Sites that state none would be taken for tips."""
+    """Joints without leaves at zero bone length: End Sites with a zero offset would be taken for tips."""
     above = np.maximum(clip.parents, 0)
     short = np.linalg.norm(places - places[above], axis=1) <= _NO_LENGTH * np.linalg.norm(np.ptp(places, axis=0))
     ends = ~np.isin(np.arange(len(places)), clip.parents) & (clip.parents >= 0)
@@ -191,7 +191,7 @@ def _with_bones(clip: Clip, places: NDArray[np.float64]) -> list[int]:
 
 
 def _says_nothing(clip: Clip) -> bool:
-    """Whether the rest's bones have no length, or lie on one line but for a quarter of them."""
+    """Whether the rest's bones have no length, or more than three quarters of them are parallel."""
     inner = clip.parents >= 0
     bones = clip.rest[inner] - clip.rest[clip.parents[inner]]
     lengths = np.linalg.norm(bones, axis=1)
@@ -203,7 +203,7 @@ def _says_nothing(clip: Clip) -> bool:
 
 
 def _most_stretched(clip: Clip) -> NDArray[np.float64]:
-    """Joint positions in the first frame in which ends lie about as far from their roots as in any, shape (B, 3)."""
+    """Joint positions in the first frame with (nearly) the largest sum of leaf-to-root distances, shape (B, 3)."""
     roots = np.arange(len(clip.names))
     for j, parent in enumerate(clip.parents):
         roots[j] = j if parent < 0 else roots[parent]

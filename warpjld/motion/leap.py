@@ -1,4 +1,4 @@
-"""Recordings of a Leap Motion Controller (leapjs-playback): positions of a tracked hand's joints, millimetres."""
+"""Reader of Leap Motion Controller recordings (leapjs-playback): joint positions of tracked hands, millimetres."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NEEDED = tuple(_THUMB)
 
 
 def is_leap(content: Any) -> bool:
-    """Whether JSON holds Leap Motion frames: objects with hands or pointables, or packed rows under their fields."""
+    """Whether JSON content holds Leap Motion frames: objects with hands or pointables, or packed rows of fields."""
     frames = content.get("frames") if isinstance(content, Mapping) else None
     if not isinstance(frames, list):
         return False
@@ -35,11 +35,11 @@ def leap_hands(content: Mapping[str, Any]) -> HandRecording:
     """The hands of a recording, by side, in either of its formats: objects (0.1, 1) or packed arrays (2).
 
     The controller calls the joint after the metacarpal mcp; a thumb's metacarpal has no length there, so that its mcp
-    is the thumb's base. A hand that is lost and seen again has another number: hands are told apart by their side.
-    Frames where one was lost are left out: they are interpolated.
+    is the thumb's base. A hand that is lost and found again gets another id, so hands are identified by their side.
+    Frames without a hand are left out and interpolated later.
 
     Raises:
-        InputError: No frame holds a whole hand, or a frame is not as the format wants it.
+        InputError: No frame holds a whole hand, or a frame does not follow the format.
     """
     try:
         frames = _unpacked(content["frames"])
@@ -85,7 +85,7 @@ def leap_hands(content: Mapping[str, Any]) -> HandRecording:
 
 
 def _whole_hands(frame: Mapping[str, Any]) -> list[tuple[str | None, dict[str, list[float]]]]:
-    """Side and joints of the hands of a frame that have all five fingers."""
+    """Side and joint positions of the hands of a frame that have all five fingers."""
     found: list[tuple[str | None, dict[str, list[float]]]] = []
     for hand in frame.get("hands", ()):
         fingers = [p for p in frame.get("pointables", ()) if p["handId"] == hand["id"] and not p.get("tool")]
@@ -119,7 +119,7 @@ def _joints(fingers: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
 
 
 def _unpacked(frames: Sequence[Any]) -> list[Mapping[str, Any]]:
-    """Frames as objects; in format 2 the first entry lists the fields, the others are rows."""
+    """Frames as objects; in format 2 the first entry lists the fields, the others are rows of values."""
     if not frames:
         raise InputError("no frames")
     if isinstance(frames[0], Mapping):

@@ -1,4 +1,4 @@
-"""Any motion file → poses of a rig."""
+"""Loading of any motion file as poses of a rig."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ MOTION_FORMATS = {
     ".npz": "tracked hands: MANO poses or MediaPipe landmarks as NumPy arrays",
     ".npy": "a tracked hand: MANO poses or MediaPipe landmarks as one NumPy array",
 }
-"""What each suffix is, for help texts."""
+"""Suffix → description, for help texts."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedMotion:
-    """A motion file on a rig.
+    """Poses of a rig from a motion file.
 
     Attributes:
-        poses: The rig's poses, frame after frame.
+        poses: The rig's poses, one per frame.
         rate: Frames a second.
-        notes: What drives what, and what was held at a limit, for people to read.
-        warnings: What of the motion the rig does not follow, and what looks wrong: told on stderr by every command.
+        notes: What drives what, and angles held at limits, for the user.
+        warnings: What of the motion is not followed, and what looks wrong; every command prints them on stderr.
     """
 
     poses: Poses
@@ -71,25 +71,25 @@ def load_motion(
     animation: str | None = None,
     flat_hand_mean: bool | None = None,
 ) -> LoadedMotion:
-    """Read a motion file for a rig; the suffix says which kind it is (see ``MOTION_FORMATS``).
+    """Read a motion file for a rig; the suffix determines its kind (see ``MOTION_FORMATS``).
 
-    Tables of angles are drawn by Kochanek–Bartels splines from the first key to the last, and are the only ones that
-    joint limits apply to: captured rotations are taken as they are.
+    Tables of angles are interpolated by Kochanek–Bartels splines from the first key to the last. Joint limits apply to
+    them only: captured rotations are used as they are.
 
     Args:
         path: The file.
-        rig: What is driven; see ``read_csv``, ``retarget``, ``own_poses`` and ``poses_of_hands`` for how.
+        rig: Rig to pose; see ``read_csv``, ``retarget``, ``own_poses`` and ``poses_of_hands`` for how.
         rate: Frames a second of the result; None for the file's own, or 30 for tables, which have none. A table's
-            frames are played at that rate, all others are resampled to it.
+            frames are played at that rate, all other motions are resampled to it.
         limits: What to do with angles beyond a joint's limit, see ``Motion.sample``.
-        side: ``left`` or ``right``: which hand a recording is of, where its file leaves it open or is wrong; of a
-            recording of both, the hand to follow.
-        animation: Name of one of the file's animations; None for the first, or where it holds a single motion.
-        flat_hand_mean: Whether no rotation in MANO poses means the flat hand (True) or MANO's mean pose (False), where
-            the file does not say.
+        side: ``left`` or ``right``: side of a recorded hand, if its file does not state it or is wrong; of a recording
+            of both, the hand to use.
+        animation: Name of one of the file's animations; None for the first.
+        flat_hand_mean: Whether zero rotations of MANO poses mean the flat hand (True) or MANO's mean pose (False), if
+            the file does not state it.
 
     Raises:
-        InputError: An unknown suffix, a file that cannot be read or understood, or that does not fit the rig.
+        InputError: An unknown suffix, or a file that cannot be read or does not fit the rig.
 
     Examples:
         >>> from tempfile import mkdtemp
@@ -143,7 +143,7 @@ def _animation(path: Path, rig: Rig, rate: float | None, name: str | None) -> Lo
     animation = read(path, rate=rate, name=name)
     own = own_poses(animation, rig)
     clip = replace(animation.clip(), notes=animation.notes)
-    # at another rate than the file's, a flip may look like a turn, or a turn like a flip
+    # flips are searched at the file's rate: resampling may hide or create them
     recorded = clip if rate is None else read(path, name=name).clip()
     flips = jumps(recorded.names, recorded.locals())
     if own is None:
@@ -155,7 +155,7 @@ def _animation(path: Path, rig: Rig, rate: float | None, name: str | None) -> Lo
 
 
 def _retargeted(clip: Clip, rig: Rig, rate: float | None, flips: list[str]) -> LoadedMotion:
-    """A recording of any skeleton on a rig, at a rate, with the flips that were found before it is resampled."""
+    """A clip of any skeleton retargeted to a rig and resampled; ``flips`` were found before resampling."""
     from warpjld.motion.doubts import doubts_of_clip
     from warpjld.motion.retarget import retarget_and_tell
 
@@ -177,7 +177,7 @@ _ANIMATIONS = {
     ".usdz": _USD,
     ".vrma": ("warpjld.motion.vrma", "read_vrma"),
 }
-"""What reads the animations of each suffix, called with the file, ``rate`` and ``name``."""
+"""Suffix → reader of animations, called with the file, ``rate`` and ``name``."""
 
 
 def _table(path: Path, rig: Rig, rate: float | None, limits: Limits) -> LoadedMotion:

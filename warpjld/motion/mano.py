@@ -1,4 +1,4 @@
-"""Hand poses of the MANO family: 45, 48 or 51 numbers a frame, and the hands of SMPL-H and SMPL-X poses."""
+"""Reader of hand poses of the MANO family: 45, 48 or 51 numbers a frame, and hands of SMPL-H and SMPL-X poses."""
 
 from __future__ import annotations
 
@@ -26,16 +26,17 @@ _FRAMES = ("frames", "data", "results")
 _SIDE = ("side", "handedness", "hand", "is_right", "is_rhand", "right")
 _WIDTHS = (45, 48, 51)  # axis-angle numbers: fifteen joints; with the wrist; with its place
 _BODIES = {156: (66, "SMPL-H"), 165: (75, "SMPL-X")}
-"""Width of a body's pose → where its left hand begins, the right one following, and the model's name."""
+"""Width of a body's pose → index of its left hand's first number (the right hand follows), and the model's name."""
 _MOST_TURN = 4.0 * np.pi
-"""Axis-angle vectors are π long at most, sums with a mean a little longer; degrees are soon beyond this."""
+"""Largest plausible component: axis-angle vectors have lengths up to π, sums with a mean a little more; degrees soon
+exceed this."""
 _JOINT = re.compile(r"(index|middle|pinky|little|ring|thumb)[ _.-]?(?:finger)?[ _.-]?([123])$", re.IGNORECASE)
 
 Fields = Mapping[str, Any]
 
 
 def is_mano(fields: Any) -> bool:
-    """Whether fields are MANO's by their names, or a bare array by its width."""
+    """Whether fields are MANO's, by their names, or for a bare array by its width."""
     found = _gathered(fields)
     if any(key in found for names in _HANDS.values() for key in names) or "pose_hand" in found:
         return True
@@ -56,23 +57,23 @@ def mano_hands(
 ) -> HandRecording:
     """Hands of MANO-family parameters.
 
-    Widths: 45, fifteen joints; 48, the wrist before them; 51, the wrist's translation behind them; 156 and 165, the
-    bodies of SMPL-H and SMPL-X, of which the hands alone are read. Rotations are axis-angle vectors [rad], or 3 × 3
-    matrices where a joint has nine numbers. ``global_orient`` and ``transl`` may stand beside 45 numbers. Both hands
-    may be given, as ``left_hand_pose`` and ``right_hand_pose`` or below ``left`` and ``right``.
+    Widths: 45, fifteen joints; 48, with the wrist before them; 51, with the wrist's translation after them; 156 and
+    165, bodies of SMPL-H and SMPL-X, of which only the hands are read. Rotations are axis-angle vectors [rad], or 3 × 3
+    matrices where a joint has nine numbers. ``global_orient`` and ``transl`` may accompany 45 numbers. Both hands may
+    be given, as ``left_hand_pose`` and ``right_hand_pose`` or inside ``left`` and ``right``.
 
-    Joints are in MANO's order (index, middle, pinky, ring, thumb) unless ``joint_order`` names them otherwise. Whether
-    no rotation means the flat hand or MANO's mean pose must be said: by ``flat_hand_mean`` in the file or here. The
-    mean pose is part of the licensed model: it is added where the file brings it as ``hands_mean``.
+    Joints are in MANO's order (index, middle, pinky, ring, thumb) unless ``joint_order`` names another. Whether zero
+    rotations mean the flat hand or MANO's mean pose must be stated, by ``flat_hand_mean`` in the file or here. The mean
+    pose is part of the licensed model: it is added if the file contains it as ``hands_mean``.
 
     Args:
-        fields: Arrays by name, or a list of frames with such fields; "" for the array of a file without names.
-        rate: Frames a second where the file says nothing.
-        flat_hand_mean: What no rotation means, where the file says nothing.
-        where: What to call the file's content in messages.
+        fields: Arrays by name, or a list of frames with such fields; "" is the name of the array of an unnamed file.
+        rate: Frames a second if the file does not state it.
+        flat_hand_mean: Meaning of zero rotations if the file does not state it.
+        where: Name of the file's content in messages.
 
     Raises:
-        InputError: Other widths, numbers that are not finite, an unknown order, or the mean's meaning not said.
+        InputError: Other widths, non-finite numbers, an unknown order, or ``flat_hand_mean`` stated nowhere.
     """
     found = _gathered(fields)
     notes: list[str] = []
@@ -107,7 +108,7 @@ def mano_hands(
 
 
 def _gathered(fields: Any) -> dict[str, Any]:
-    """Fields over all frames: those of a list of frames are put together, a bare list is one array."""
+    """Fields over all frames: those of a list of frames are stacked, a bare list is one array."""
     if isinstance(fields, Mapping):
         listed = next((fields[key] for key in _FRAMES if isinstance(fields.get(key), list)), None)
         if listed and isinstance(listed[0], Mapping):
@@ -130,7 +131,7 @@ def _gathered(fields: Any) -> dict[str, Any]:
 
 
 def _parts(found: Fields, warnings: list[str]) -> dict[str | None, tuple[Fields, NDArray[np.float64]]]:
-    """Per hand the fields that are its own, and its numbers, shape (F, 45), (F, 48) or (F, 51)."""
+    """Per hand its own fields and its numbers, shape (F, 45), (F, 48) or (F, 51)."""
     parts: dict[str | None, tuple[Fields, NDArray[np.float64]]] = {}
     for side, names in _HANDS.items():
         if isinstance(found.get(side), Mapping):
@@ -174,7 +175,7 @@ def _pose(values: Any, key: str) -> NDArray[np.float64]:
 
 
 def _width(array: NDArray[np.float64]) -> int | None:
-    """Numbers a frame of an array of shape (n,), (F, n), (J, 3) or (F, J, 3)."""
+    """Numbers per frame of an array of shape (n,), (F, n), (J, 3) or (F, J, 3)."""
     if array.ndim >= 2 and array.shape[-1] == 3 and 3 * array.shape[-2] in (*_WIDTHS, *_BODIES):
         return 3 * array.shape[-2]
     return array.shape[-1] if array.ndim in (1, 2, 3) and array.size else None
@@ -244,7 +245,7 @@ def _mean(found: Fields, side: str | None) -> NDArray[np.float64]:
 
 
 def _order(found: Fields) -> tuple[list[int], bool]:
-    """Where MANO's fifteen joints stand in the file, and whether it says so."""
+    """Index in the file of each of MANO's fifteen joints, and whether the file states the order."""
     names = next((found[key] for key in ("joint_order", "joint_names", "joints_order") if key in found), None)
     if names is None:
         return list(range(15)), False
@@ -274,13 +275,13 @@ def _side(found: Fields) -> str | None:
 
 
 def _plain(value: Any) -> Any:
-    """A single value out of an array of one."""
+    """The element of an array of one; other values unchanged."""
     listed = _listed(value)
     return listed[0] if len(listed) == 1 else value
 
 
 def _listed(values: Any) -> list[Any]:
-    """The values of an array of any shape, or of a list, or a single one."""
+    """The elements of an array of any shape, a list, or a single value, as a list."""
     try:
         return list(np.asarray(values).ravel().tolist())
     except ValueError:  # a ragged list

@@ -1,9 +1,10 @@
-"""How MANO's axes and rest hand lie in a rig: what carries MANO's rotations over, and back.
+"""Alignment of MANO's axes and rest hand with a rig's hand, used to convert MANO's rotations in both directions.
 
-MANO (Romero, Tzionas & Black 2017), and the hands of SMPL-H and SMPL-X, rest flat as the hands of a body in T-pose
-that faces +z: fingers of the right hand point to -x, those of the left to +x, the back of the hand to +y and the thumb
-to +z. Every joint's rotation is an axis-angle vector [rad] in these axes, relative to its parent; so the right fingers
-curl about +z and the left about -z. Bone lengths and joint places belong to the licensed model and are not needed.
+MANO (Romero, Tzionas & Black 2017), and the hands of SMPL-H and SMPL-X, are flat at rest, as the hands of a body in
+T-pose that faces +z: fingers of the right hand point to -x, those of the left to +x, the back of the hand to +y and the
+thumb to +z. Every joint's rotation is an axis-angle vector [rad] in these axes, relative to its parent; so the right
+fingers curl about +z and the left about -z. Bone lengths and joint positions belong to the licensed model and are not
+needed.
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ from warpjld.skeleton.recognise.hand_frame import hand_frame
 __all__ = ["MANO_DIGITS", "MANO_JOINTS", "ManoRest", "mano_rest"]
 
 MANO_DIGITS = ("index", "middle", "pinky", "ring", "thumb")
-"""MANO's own order."""
+"""MANO's order of the digits."""
 MANO_JOINTS = tuple(f"{digit}{k}" for digit in MANO_DIGITS for k in (1, 2, 3))
 
 _FLAT = np.cos(np.radians(20.0))
-"""Bones of a rig this near to the flat hand's are its flat hand: MANO's own bones are up to 15° off."""
+"""Largest deviation at which a digit of the rig counts as flat: MANO's own bones deviate by up to 15°."""
 _ALONG_AXES = np.radians(10.0)
-"""A hand this near to coordinate axes is modelled along them; knuckles do not define directions any better."""
+"""A hand this close to the coordinate axes is taken as aligned: knuckles do not define directions more exactly."""
 
 
 @dataclass(frozen=True, eq=False)
 class ManoRest:
-    """MANO's rest hand in a rig's.
+    """Alignment of MANO's rest hand with a rig's.
 
     Attributes:
         axes: Rotation of MANO's axes into the rig's, for the hand at rest, shape (4,).
-        joints: The rig's joint for each of MANO's fifteen, -1 where it has none.
-        align: Rotation that brings each of these joints' bones from the rig's rest to the flat hand, shape (15, 4).
+        joints: The rig's joint for each of MANO's fifteen, -1 for missing ones.
+        align: Rotation of each of these joints' bones from the rig's rest to the flat hand, shape (15, 4).
     """
 
     axes: NDArray[np.float64]
@@ -50,9 +51,10 @@ class ManoRest:
 
 
 def mano_rest(skeleton: Skeleton, side: str) -> ManoRest:
-    """MANO's rest hand in a rig: palm upon palm, fingers straight in the palm's plane, each where the rig's points.
+    """Align MANO's rest hand with a rig's: palms coincide; each finger is straight in the palm's plane, where the rig's
+    points.
 
-    The thumb lies in that plane too, at 45° to the fingers. A digit that rests within 20° of that is left as it is.
+    The thumb lies in that plane, too, at 45° to the fingers. Digits that rest within 20° of this are left unchanged.
 
     Raises:
         InputError: The rig's hand has no palm.

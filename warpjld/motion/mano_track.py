@@ -1,4 +1,4 @@
-"""A hand recorded as MANO's joint rotations drives a rig's hand."""
+"""Retargeting of a hand, given by MANO's joint rotations, to a rig's hand."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class ManoTrack:
     """Rotations of a hand's joints at K times, from the flat hand.
 
     Attributes:
-        side: ``left`` or ``right``; None where the file does not say.
+        side: ``left`` or ``right``; None if the file does not state it.
         times: Times [s], increasing, shape (K,).
         pose: Axis-angle vectors [rad] in MANO's axes, relative to the parent, in MANO's order, shape (K, 15, 3).
-        orient: The wrist's, shape (K, 3); None where the file has none.
-        place: Where the hand is [m], shape (K, 3); None where the file has none.
-        in_rig: Whether orientation and place are in a rig's own axes and from its origin, as ``write_mano`` gives
-            them; those of other files are in some camera's, and count from their first frame.
-        labels: What the file calls each time.
+        orient: Rotation of the wrist, shape (K, 3); None without.
+        place: Position of the hand [m], shape (K, 3); None without.
+        in_rig: Whether orientation and position are in a rig's own axes and from its origin, as ``write_mano`` writes
+            them; those of other files are in camera axes, and only changes from their first frame are used.
+        labels: The file's name of each time, for messages.
     """
 
     side: str | None
@@ -43,17 +43,17 @@ class ManoTrack:
 
     @property
     def may_be_mirrored(self) -> bool:
-        """Rotations are of the side they state."""
+        """False: rotations belong to the side they state."""
         return False
 
     @property
     def leaning(self) -> str | None:
-        """A flat hand's rotations say nothing of its side."""
+        """None: a flat hand's rotations do not show its side."""
         return None
 
     @cached_property
     def bends(self) -> NDArray[np.float64]:
-        """Bends [rad] of the fingers' joints as of a right hand, shape (K, 4, 3): of MANO's rest hand, any lengths."""
+        """Bends [rad] of the finger joints for a right hand, shape (K, 4, 3), from MANO's rest hand with unit bones."""
         count = len(self.times)
         points = {"wrist": np.zeros((count, 3))}
         turns = about(self.pose).reshape(count, len(MANO_DIGITS), 3, 4)
@@ -70,11 +70,11 @@ class ManoTrack:
         return finger_bends(points)
 
     def called(self, side: str) -> ManoTrack:
-        """The same numbers, taken for those of a hand of this side."""
+        """The same data, taken as those of a hand of this side."""
         return replace(self, side=side)
 
     def mirrored(self) -> ManoTrack:
-        """The other hand doing the same: rotations mirrored in the plane x = 0 change the signs of y and z."""
+        """The mirror image: mirroring in the plane x = 0 changes the signs of a rotation vector's y and z."""
         turned = np.array([1.0, -1.0, -1.0])
         return replace(
             self,
@@ -86,14 +86,14 @@ class ManoTrack:
         )
 
     def turns(self, skeleton: Skeleton) -> HandTurns:
-        """How the joints of a rig's hand of the same side turn.
+        """Rotations of the joints of a rig's hand of the same side.
 
-        With R the rotation of a joint's bone from the flat hand, in the wrist's axes, W the rotation of MANO's axes
-        into the rig's and A the one that brings the rig's rest bone to the flat hand, the rig's bone turns by
+        With R the rotation of a joint's bone from the flat hand, in the wrist's axes, W the rotation from MANO's axes
+        to the rig's and A the rotation of the rig's rest bone to the flat hand, the rig's bone is rotated by
 
             Q = W R Wᵀ A
 
-        relative to its wrist: no rotation is the flat hand, and twist is followed.
+        relative to its wrist: zero rotations give the flat hand, and twist is preserved.
 
         Raises:
             InputError: The rig's hand has no palm.

@@ -1,7 +1,7 @@
-"""MediaPipe's 21 hand landmarks, as its tasks, its older solutions and people's scripts write them: JSON and NPZ.
+"""Reader of MediaPipe's 21 hand landmarks, as written by its tasks, its older solutions and scripts: JSON and NPZ.
 
-Axes are the camera's: x to the right, y down, z away from it. World landmarks are metres about the hand's centre;
-image landmarks have x and y as parts of the image's width and height, and z on the scale of x.
+Axes are the camera's: x to the right, y down, z away from it. World landmarks are in metres from the hand's centre;
+image landmarks have x and y as fractions of the image's width and height, and z on the scale of x.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _FRAMES = ("frames", "results", "data")
 
 
 def is_mediapipe(content: Any) -> bool:
-    """Whether JSON holds hand landmarks: frames of them, or a field with a name that MediaPipe gives them."""
+    """Whether JSON content holds hand landmarks: frames of them, or a field with one of MediaPipe's names."""
     if isinstance(content, Mapping) and any(key in content for key in _WORLD + _STEMS):
         return True
     if any(hands_by_side(frame) for frame in (_frames(content) or [content])):
@@ -67,13 +67,13 @@ def is_mediapipe(content: Any) -> bool:
 def mediapipe_hands(content: Any, rate: float | None = None) -> HandRecording:
     """Hands of a JSON recording: a list of frames, or an object with one in ``frames``, or a single frame.
 
-    A frame is an object with ``landmarks`` and ``world_landmarks`` (also by the tasks' and the solutions' names), of
-    one hand or several, ``handedness``, ``confidence`` and a time; or with a hand under each side, as the holistic
-    landmarker has them; or a list of hands; or just 21 points. World landmarks are preferred.
+    A frame is an object with ``landmarks`` and ``world_landmarks`` (or the names of the tasks and solutions) of one or
+    several hands, ``handedness``, ``confidence`` and a time; or an object with a hand per side, as the holistic
+    landmarker writes them; or a list of hands; or 21 points. World landmarks are preferred.
 
     Args:
-        content: What the file holds.
-        rate: Frames a second where it does not say.
+        content: Content of the file.
+        rate: Frames a second if the file does not state it.
 
     Raises:
         InputError: No hand in any frame, or landmarks that are not 21 points, with the frame's number.
@@ -103,8 +103,8 @@ def mediapipe_hands(content: Any, rate: float | None = None) -> HandRecording:
 def mediapipe_arrays(arrays: Mapping[str, NDArray[Any]], rate: float | None = None) -> HandRecording:
     """Hands of an NPZ or NPY file: ``landmarks`` or ``world_landmarks``, shape (F, 21, 3) or (F, hands, 21, 3).
 
-    Beside them may stand ``confidence`` of shape (F,), (F, hands), (F, 21) or (F, hands, 21), ``handedness`` (one, one
-    a hand, or one a frame and hand), ``timestamps`` or ``fps``, and ``image_size``. Frames with NaN are gaps.
+    Optional arrays: ``confidence`` of shape (F,), (F, hands), (F, 21) or (F, hands, 21), ``handedness`` (one, one per
+    hand, or one per frame and hand), ``timestamps`` or ``fps``, and ``image_size``. Frames with NaN are gaps.
 
     Raises:
         InputError: Arrays of other shapes.
@@ -139,7 +139,7 @@ def mediapipe_arrays(arrays: Mapping[str, NDArray[Any]], rate: float | None = No
 
 
 def _frames(content: Any) -> list[Any]:
-    """Frames of a recording; a single result is one."""
+    """Frames of a recording; a single result is one frame."""
     if isinstance(content, Mapping):
         listed = next((content[key] for key in _FRAMES if isinstance(content.get(key), list)), None)
         if listed is None and (key := _has(content, _WORLD) or _has(content, _STEMS)):
@@ -184,7 +184,7 @@ def _hands_of(frame: Any, about: Mapping[str, Any]) -> list[SeenHand]:
         numbers = np.array(rows, dtype=np.float64)
         if not np.isfinite(numbers[:, :3]).all():
             continue
-        sure = numbers[:, 3] if (numbers[:, 3] > 0.0).any() else np.ones(_COUNT)  # MediaPipe leaves it 0 for hands
+        sure = numbers[:, 3] if (numbers[:, 3] > 0.0).any() else np.ones(_COUNT)  # MediaPipe's is 0 for hands
         side, score = _label(stated)
         place = numbers[:, :3] * [1.0, -1.0, -1.0]
         hands.append(SeenHand(place, sure * _sureness(sureness, slot, len(listed)), side, score, slot))
@@ -192,13 +192,13 @@ def _hands_of(frame: Any, about: Mapping[str, Any]) -> list[SeenHand]:
 
 
 def _in_image(seen: list[list[SeenHand]]) -> bool:
-    """Whether coordinates are parts of an image: from 0 to 1, but for hands that leave it; metres are about 0."""
+    """Whether coordinates are fractions of an image, mostly from 0 to 1; world coordinates are centred on 0."""
     places = [hand.points[:, :2] * [1.0, -1.0] for hands in seen for hand in hands]
     return bool(places) and bool(((np.array(places) >= 0.0) & (np.array(places) <= 1.0)).mean() > 0.8)
 
 
 def _sureness(given: Any, slot: int, hands: int) -> NDArray[np.float64] | float:
-    """Confidence in a hand, or in each of its landmarks."""
+    """Confidence in a hand, or in each of its landmarks, between 0 and 1."""
     if given is None:
         return 1.0
     array = np.asarray(given, dtype=np.float64)
@@ -222,7 +222,7 @@ def _per_hand(stated: Any, count: int) -> list[Any]:
 
 
 def _label(stated: Any) -> tuple[str | None, float]:
-    """Side and confidence of a label, a category, or the likeliest of several."""
+    """Side and confidence of a label, a category, or the most probable of several."""
     if isinstance(stated, Mapping) and "classification" in stated:
         stated = stated["classification"]
     if isinstance(stated, list):

@@ -1,8 +1,8 @@
-"""A rig's own animation: each joint takes the transform that the file gives it, whatever was guessed on loading.
+"""Playback of a rig's own animation: each joint takes the transform that the file gives it.
 
 The rig may have been scaled and turned when it was loaded (``Rig.placing``, S below), and the animation may come from
 another export of the same skeleton, placed by P. With B a joint's rest and A(t) its animated transform, both joint to
-world in their files, the flesh on it moves by
+world in their files, the flesh of the joint moves by
 
     M(t) = S P⁻¹ A(t) B⁻¹ S⁻¹
 """
@@ -33,20 +33,20 @@ else:
 
 __all__ = ["OwnMotion", "own_poses"]
 
-_ENOUGH = 0.5  # share of a rig's joints that an animation must know to be its own
-_WIDENED = 1e-3  # change of size of a joint's flesh from which it is told
-_COLLAPSED = 1e3  # times: of flesh that was shrunk to a point at rest, which is told on loading
-_TURNED = np.radians(5.0)  # own rotation of a merged joint from which it is told
+_ENOUGH = 0.5  # smallest share of a rig's joints that an animation of it must have
+_WIDENED = 1e-3  # smallest change of scale of a joint's flesh that is reported
+_COLLAPSED = 1e3  # scale that indicates flesh shrunk to a point at rest, which loading has reported already
+_TURNED = np.radians(5.0)  # smallest own rotation of a merged joint that is reported
 
 
 @dataclass(frozen=True, eq=False)
 class OwnMotion:
-    """A rig moved by its own joints.
+    """Poses of a rig from an animation of its own joints.
 
     Attributes:
-        poses: Its poses.
-        notes: How its joints were found.
-        warnings: What of the animation the flesh does not follow.
+        poses: The poses.
+        notes: How the joints were matched.
+        warnings: What of the animation is not followed.
     """
 
     poses: Poses
@@ -55,11 +55,11 @@ class OwnMotion:
 
 
 def own_poses(animation: JointAnimation, rig: Rig) -> OwnMotion | None:
-    """A rig moved by an animation of its own joints, by name and rest; None where they are another skeleton's.
+    """Poses of a rig from an animation of its own joints, matched by name and rest; None for another skeleton.
 
-    Flat hierarchies and joints that move are followed. Scale moves joints, but does not widen the flesh; joints that
-    recognition merged into another (twist bones, say) only count by where they carry the joints below them. Both are
-    told where they matter.
+    Flat hierarchies and moving joints are supported. Scale moves joints but does not scale the flesh; joints that
+    recognition merged into another (such as twist bones) have an effect only through the joints below them. Both are
+    reported where they matter.
     """
     if rig.source is None:
         return None
@@ -77,7 +77,7 @@ def own_poses(animation: JointAnimation, rig: Rig) -> OwnMotion | None:
     moved = np.empty((len(animation), len(rig.skeleton), 4, 4))
     moved[:, known] = _flesh(rig, worlds[:, sources], sources)
     for j, parent in enumerate(rig.skeleton.parents):
-        if j not in known:  # an added fingertip, say
+        if j not in known:  # such as an added fingertip
             moved[:, j] = moved[:, parent] if parent >= 0 else np.eye(4)
     turned, stretch = polar(moved[..., :3, :3])
     positions = np.einsum("fjab,jb->fja", moved[..., :3, :3], rig.skeleton.rest) + moved[..., :3, 3]
@@ -91,7 +91,7 @@ def own_poses(animation: JointAnimation, rig: Rig) -> OwnMotion | None:
 def _placed(
     animation: JointAnimation, own: SourceTree, match: NDArray[np.int64], sources: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], list[str]] | None:
-    """Animated transforms of the rig file's joints in its world, shape (F, N, 4, 4), the rest pose where unknown."""
+    """Animated transforms of the rig's file joints in its world, shape (F, N, 4, 4); rest for unmatched joints."""
     known = np.flatnonzero(match >= 0)
     out = np.tile(own.frames, (len(animation), 1, 1, 1))
     placing = same_rest(animation.tree.frames[match[sources]], own.frames[sources])
@@ -109,7 +109,7 @@ def _placed(
     for k in sorted(range(len(known)), key=lambda k: own.depth(int(known[k]))):
         if parents[k] < 0:
             out[:, known[k]] = world @ theirs[:, k]
-            # the scale of the file's joint frames stays that of the rig's
+            # the joint frames keep the scale of the rig's file
             shown = world @ animation.tree.frames[match[known[k]]]
             out[:, known[k], :3, :3] *= _size(own.frames[known[k]]) / _size(shown)
             continue
@@ -126,13 +126,13 @@ def _size(frame: NDArray[np.float64]) -> float:
 
 
 def _flesh(rig: Rig, worlds: NDArray[np.float64], sources: NDArray[np.int64]) -> NDArray[np.float64]:
-    """How joints' flesh moves, in the rig's own metres and axes, shape (F, K, 4, 4)."""
+    """Transforms of joints' flesh from rest, in the rig's metres and axes, shape (F, K, 4, 4)."""
     assert rig.source is not None
     return rig.placing @ worlds @ np.linalg.inv(rig.source.frames[sources]) @ np.linalg.inv(rig.placing)
 
 
 def _widened(rig: Rig, stretch: NDArray[np.float64]) -> list[str]:
-    """Joints whose flesh the file scales, stretch (F, J, 3)."""
+    """Warning about joints whose flesh the file scales, from stretches (F, J, 3)."""
     fleshy = np.ones(len(rig.skeleton), dtype=bool)
     if rig.skin is not None:
         fleshy[:] = False
@@ -154,7 +154,7 @@ def _widened(rig: Rig, stretch: NDArray[np.float64]) -> list[str]:
 
 
 def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], turned: NDArray[np.float64]) -> list[str]:
-    """Joints of the file that belong to another of the skeleton, and turn by themselves."""
+    """Warning about joints of the file that were merged into another and rotate relative to it."""
     assert rig.source is not None
     of_source = {source: j for j, source in enumerate(rig.sources) if source >= 0}
     told: list[tuple[float, str]] = []
@@ -167,7 +167,7 @@ def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], tur
         below = next((of_source[k] for k in rig.source.subtree(s) if k in of_source), None)
         if below is None:
             apart = float(relative.magnitude().max())
-        else:  # a limb's twist is spread along its segment anyhow
+        else:  # twist is distributed along the segment by the covering
             place = (rig.placing @ rig.source.frames[s])[:3, 3]
             bone = unit(rig.skeleton.rest[below] - place)
             apart = float(np.arccos(np.clip(relative.apply(bone) @ bone, -1.0, 1.0)).max())

@@ -1,13 +1,13 @@
-"""A recording of a rig's own joints: BVH that shows its skeleton, joint by joint and in its own rest pose.
+"""Detection of BVH recordings that have a rig's own skeleton, joint by joint and with its rest pose.
 
-BVH has no joint frames, only places: zero rotations are the rest, whose joints lie where OFFSETs lead. Where a
-similarity T brings these places on those of the rig's joints of the same names, the recording is an animation of the
-rig's own. With R and p a joint's rotation from rest and its position, Q the rotation in T, and B the joint's rest
-transform in the rig's file, it is
+BVH has joint positions but no joint frames: zero rotations give the rest pose, whose joints are placed by OFFSETs.
+If a similarity T maps these positions to those of the rig's joints of the same names, the recording is an animation of
+the rig's own joints. With R and p a joint's rotation from rest and its position, Q the rotation in T, and B the joint's
+rest transform in the rig's file, it is
 
     A(t) = [ Q R(t) Qᵀ B,  T p(t) ]
 
-A hierarchy's first OFFSET is often 0 and its position channels say where it is: T then leaves the origin in its place.
+The first OFFSET of a hierarchy is often 0 and its position channels give its place: T then keeps the origin.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ else:
 
 __all__ = ["OwnRecording", "own_recording", "with_own_joints"]
 
-_ENOUGH = 0.5  # share of a rig's joints that a recording must have to be of the rig
+_ENOUGH = 0.5  # smallest share of a rig's joints that a recording of it must have
 _SAME = 1e-3
-"""Of the rig's size, by which places of joints at rest may differ: some programs write three decimals of a metre."""
+"""Tolerance of joint positions at rest, per size of the rig: some programs write three decimals of a metre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,9 @@ class OwnRecording:
     """A recording as an animation of a rig's own joints.
 
     Attributes:
-        animation: Those joints of the rig that the recording has.
-        followed: Joints of the recording that are joints of the rig's skeleton, or carry one.
-        notes: What was decided.
+        animation: Animation of those joints of the rig that the recording has.
+        followed: Joints of the recording that are joints of the rig's skeleton or ancestors of one.
+        notes: Decisions, for the user.
     """
 
     animation: JointAnimation
@@ -58,7 +58,7 @@ class OwnRecording:
 
 
 def with_own_joints(rig: Rig) -> Rig:
-    """A rig with a tree of its own joints: of one made without a file, those of its skeleton."""
+    """A rig with a tree of its own joints: for one made without a file, those of its skeleton."""
     if rig.source is not None:
         return rig
     count = len(rig.skeleton)
@@ -69,11 +69,11 @@ def with_own_joints(rig: Rig) -> Rig:
 
 
 def own_recording(clip: Clip, rig: Rig) -> OwnRecording | None:
-    """A recording as an animation of a rig's own joints; None where it shows another skeleton, or another rest.
+    """A recording as an animation of a rig's own joints; None for another skeleton or rest pose.
 
     Args:
         clip: The recording.
-        rig: One with a ``source``, see ``with_own_joints``.
+        rig: A rig with a ``source``, see ``with_own_joints``.
     """
     assert rig.source is not None
     places = rig.source.positions @ rig.placing[:3, :3].T + rig.placing[:3, 3]
@@ -92,7 +92,7 @@ def own_recording(clip: Clip, rig: Rig) -> OwnRecording | None:
             clip = clip.turned_rest(turn)
             fit = replace(fit, turn=fit.turn * transform.Rotation.from_quat(turn).inv())
     top = [k for k in match[match >= 0].tolist() if clip.parents[k] < 0]
-    if top and not clip.rest[top].any():  # else a node of the file's own, such as Reference, stands at the origin
+    if top and not clip.rest[top].any():  # otherwise an extra node of the file, such as Reference, is at the origin
         fit = replace(fit, shift=np.zeros(3))
     own = np.flatnonzero(match >= 0)
     worlds = _worlds(clip, match[own], fit, rig.placing, rig.source.frames[own])
@@ -106,7 +106,7 @@ def own_recording(clip: Clip, rig: Rig) -> OwnRecording | None:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """What takes a recording's places to those of a rig [m]: ``scale`` times ``turn`` of them, and ``shift``."""
+    """Similarity from a recording's positions to those of a rig [m]: x ↦ ``scale`` · ``turn`` x + ``shift``."""
 
     scale: float
     turn: transform.Rotation
@@ -114,7 +114,7 @@ class _Fit:
 
 
 def _similarity(theirs: NDArray[np.float64], own: NDArray[np.float64]) -> _Fit | None:
-    """What brings places (K, 3) on others, with quarter turns before others; None where nothing does."""
+    """The similarity that maps positions (K, 3) to others, quarter turns preferred; None if the residual is large."""
     middles = theirs.mean(axis=0), own.mean(axis=0)
     a, b = theirs - middles[0], own - middles[1]
     if not np.linalg.norm(a) > 0.0:
@@ -138,7 +138,7 @@ def _worlds(
     placing: NDArray[np.float64],
     rest: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """A: joint-to-world transforms of K joints in the rig's file, shape (F, K, 4, 4)."""
+    """A: joint-to-world transforms of K joints in the rig's file, shape (F, K, 4, 4); see the module's docstring."""
     shape = len(clip), len(joints)
     back = np.asarray(np.linalg.inv(placing), dtype=np.float64)
     turn, _ = polar(back[:3, :3])
@@ -152,7 +152,7 @@ def _worlds(
 
 
 def _tree(clip: Clip, own: SourceTree) -> SourceTree:
-    """The recording's joints; of doubled names that were numbered, which BVH wants, without the numbers."""
+    """The recording's joints; numbers that were appended to make duplicate names unique are removed."""
     doubled = {name for name, count in Counter(own.names).items() if count > 1}
     bare = [re.sub(r"_[0-9]+$", "", name) for name in clip.names]
     names = tuple(b if n not in own.names and b in doubled else n for n, b in zip(clip.names, bare, strict=True))
@@ -162,7 +162,7 @@ def _tree(clip: Clip, own: SourceTree) -> SourceTree:
 
 
 def _subtree(tree: SourceTree, joints: NDArray[np.int64]) -> SourceTree:
-    """Some joints of a tree, each below the nearest of its ancestors that is one of them."""
+    """Some joints of a tree, each a child of its nearest chosen ancestor."""
     number = {int(j): k for k, j in enumerate(joints)}
     parents = [next((number[a] for a in tree.ancestors(int(j)) if a in number), -1) for j in joints]
     return SourceTree(tuple(tree.names[j] for j in joints), np.array(parents, dtype=np.int64), tree.frames[joints])

@@ -1,4 +1,4 @@
-"""Which joint of a recording drives which joint of a rig, besides the trunk."""
+"""Correspondence of a recording's joints to a rig's, except for the trunk."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _DIGIT_JOINTS = ("base", "knuckle2", "knuckle3")
 
 
 def limb_names() -> list[str]:
-    """Canonical names of limbs' and digits' joints, parents first."""
+    """Canonical names of the joints of limbs and digits, parents first."""
     return [
         f"{side}.{part}"
         for side in ("left", "right")
@@ -25,12 +25,13 @@ def limb_names() -> list[str]:
 def pair_joints(
     clip: Clip, skeleton: Skeleton
 ) -> tuple[Clip, Landmarks, Landmarks, dict[str, tuple[int, int]], tuple[str, ...]]:
-    """The clip with a usable rest, landmarks of both, and per canonical name its joint in the rig and in the clip."""
+    """The clip with a usable rest pose, landmarks of both, canonical name → (joint of the rig, joint of the clip), and
+    notes."""
     sides = {name.partition(".")[0] for name in skeleton.names if name.endswith(".wrist")}
     clip, source, notes = with_usable_rest(clip, side=sides.pop() if len(sides) == 1 else None)
     target = landmarks_of_skeleton(skeleton)
     both = source.joints.keys() & target.joints.keys()
-    # a single bone for a whole finger is a mitten: it would bend this finger and not its neighbours
+    # a single bone for all fingers (mitten) would move this finger without its neighbours
     mittens = {
         f"{side}.{digit}"
         for side in ("left", "right")
@@ -43,7 +44,7 @@ def pair_joints(
 
 
 def _toes(source: Landmarks, target: Landmarks) -> dict[str, tuple[int, int]]:
-    """Toes by number; where one has five and the other only a ball, its ball goes with all of them."""
+    """Toes by number; where only the rig has five toes, or only the clip, the ball and the toes are paired."""
     out = {}
     for side in ("left", "right"):
         toes = [name for name in target.joints if name.startswith(f"{side}.toe") and not name.endswith(".tip")]

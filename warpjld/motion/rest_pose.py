@@ -1,10 +1,10 @@
-"""A rest that retargeting can start from: the recording's own, or, where that is arbitrary, a frame of the motion.
+"""Rest pose for retargeting: the recording's own, or a frame of the motion where that one is arbitrary.
 
-Several mocap systems write every OFFSET along the bone's own X, or none at all and a position for every joint: the
-rest pose is then no pose. Where bones point in the *frames* holds whatever the rest is, so the frame that is most like
-somebody standing straight takes its place, told so that the body stands upright there and faces the file's front; its
-lean and heading stay in the motion. A rest that is a pose may still stand along another axis than the figure does in
-the frames, where a root carries all of them from one to the other; the floor tells that from somebody who lies down.
+Several mocap systems write every OFFSET along the bone's own X, or no OFFSETs at all and a position for every joint:
+such a rest is no pose of a body. Bone directions in the *frames* are valid in any case, so the frame closest to upright
+standing replaces it, rotated so that the body stands upright and faces the file's front; its lean and heading stay in
+the motion. A valid rest pose may have another up axis than the frames, if a root rotation converts between them; the
+floor distinguishes this from a person who lies down.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ else:
 __all__ = ["turn_of_rest", "with_usable_rest"]
 
 _OFF = 10.0
-"""Degrees by which a rest's bones, carried by the rotations, may miss those of the frames."""
+"""Largest median deviation [°] of bone directions in the frames from the rest's, carried by the rotations."""
 
 _LEAN = 10.0
-"""Degrees from the vertical within which a trunk counts as upright: where spines of models lean anyway."""
+"""Angle [°] to the vertical up to which a trunk counts as upright: the spines of models are tilted, too."""
 
 _AS_GOOD = 10.0
-"""Degrees by which a frame may be less like somebody standing than the best one, and come first nevertheless."""
+"""Score [°] above that of the best frame at which an earlier frame is preferred."""
 
 _MOSTLY = 0.8
-"""Length of the mean of a figure's directions from feet to head above which it stands or lies one way all along."""
+"""Length of the mean of a figure's unit feet-to-head vectors above which its orientation counts as constant."""
 
 _FLOOR = 0.08
-"""Heights, per size of the figure, within which its lowest joint stays on a floor."""
+"""Tolerance of the floor's height, per size of the figure."""
 
 _BEHIND = 0.3
-"""Part of a foot's length by which its toes lie behind the shin, of one that points backwards."""
+"""Distance of the toes behind the shin, per length of the foot, at which a foot points backwards."""
 
 _AXES = ("x", "y", "z")
 _SIDEWAYS = 0.2
-"""Length of what remains of a line across the body, per length, from where on it has a direction."""
+"""Smallest relative length of the horizontal part of a line across the body that gives a direction."""
 
 
 def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Landmarks, tuple[str, ...]]:
-    """A recording with a rest that is a pose, its landmarks, and notes on what was put in its place."""
+    """A recording with a usable rest pose, its landmarks, and notes on what was replaced."""
     marks = _sided_landmarks(clip, side)
     ways = _ways(marks, clip.positions)
     if ways is None:
@@ -73,9 +73,9 @@ def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Land
 
 
 def _sided_landmarks(clip: Clip, side: str | None) -> Landmarks:
-    """Landmarks of a recording; left and right are changed where its feet say that names have them the wrong way round.
+    """Landmarks of a recording; left and right are exchanged if its feet would point backwards.
 
-    That is a file that some program mirrored: with the names' sides, its knees would bend backwards.
+    This occurs in files that a program mirrored: with the sides of the names, knees would bend backwards.
     """
     marks = landmarks_of_clip(clip, side=side)
     if not _feet_behind(marks, clip.positions):
@@ -87,7 +87,7 @@ def _sided_landmarks(clip: Clip, side: str | None) -> Landmarks:
 
 
 def _feet_behind(marks: Landmarks, places: NDArray[np.float64]) -> bool:
-    """Whether feet lie behind the shins, as seen from the pelvis, over all frames."""
+    """Whether feet point backwards relative to the pelvis, on average over all frames."""
     across, sides = marks.across("hip", places), []
     for side in ("left", "right"):
         toes = (f"{side}.ball", f"{side}.toe3.base", f"{side}.toe1.base")
@@ -112,7 +112,7 @@ def _ways(marks: Landmarks, places: NDArray[np.float64]) -> NDArray[np.float64] 
 
 
 def _arbitrary(clip: Clip, marks: Landmarks) -> str:
-    """Why a rest is no pose of a body; "" where it is one."""
+    """Why a rest is no pose of a body, for the user; "" if it is one."""
     thighs, arms = marks.segment("hip", "knee", marks.rest), marks.segment("shoulder", "elbow", marks.rest)
     trunk = marks.trunk(marks.rest)
     for limbs in (thighs, arms):
@@ -139,7 +139,7 @@ def _arbitrary(clip: Clip, marks: Landmarks) -> str:
 
 
 def _inconsistent(clip: Clip, marks: Landmarks) -> bool:
-    """Whether most bones of limbs do not point where rotations carry them from the rest."""
+    """Whether most limb bones deviate in the frames from the rest's directions carried by the rotations."""
     ends = {
         (int(marks.parents[j]), j)
         for part in ("elbow", "wrist", "knee", "ankle")
@@ -156,7 +156,7 @@ def _inconsistent(clip: Clip, marks: Landmarks) -> bool:
 
 
 def _most_like_standing(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> int:
-    """First frame with a trunk and legs about as straight, and arms about as even, as those of any."""
+    """First frame with nearly the best score: straight, upright trunk and legs, and symmetric arms."""
     score = np.zeros(len(places))
     trunk = marks.trunk(places)
     if trunk is not None:
@@ -176,7 +176,7 @@ def _most_like_standing(marks: Landmarks, places: NDArray[np.float64], up: NDArr
 
 
 def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How a pose is turned from somebody who stands upright and faces the front, for every bone, shape (B, 4)."""
+    """Rotation of every bone from upright standing, facing the front, to a pose, shape (B, 4)."""
     trunk = marks.trunk(places)
     rises = up if trunk is None or _degrees(trunk, up) < _LEAN else unit(trunk)
     lines = [marks.across(part, places) for part in ("hip", "shoulder")]
@@ -196,9 +196,10 @@ def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64
 
 
 def _standing(up: NDArray[np.float64], body: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Left, up and forward, as columns, of somebody in the file's axes who faces its front.
+    """Left, up and forward directions, as columns, of a person in the file's axes who faces its front.
 
-    That is +z where y is up, as in BVH files, and -y where z is up, as in Blender; elsewhere the axis a body faces.
+    The front is +z if y is up, as in BVH files, and -y if z is up, as in Blender; otherwise the axis that the body
+    faces.
     """
     if up[1] > 0.5:
         return np.eye(3)
@@ -209,7 +210,7 @@ def _standing(up: NDArray[np.float64], body: NDArray[np.float64]) -> NDArray[np.
 
 
 def _frame(across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Columns: left, up, forward."""
+    """Columns left, up, forward from a line across the body; None if that is nearly vertical."""
     left = across - up * (up @ across)
     if np.linalg.norm(left) <= _SIDEWAYS * np.linalg.norm(across):
         return None
@@ -218,7 +219,7 @@ def _frame(across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.f
 
 
 def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
-    """Turn of a rest that stands along another axis than the figure does in the frames, with a note; None where not."""
+    """Rotation of a rest pose whose up axis differs from that of the frames, and a note; None if they agree."""
     at_rest, ways, pelvis = _ways(marks, marks.rest), _ways(marks, clip.positions), marks.pelvis
     if at_rest is None or ways is None or pelvis is None:
         return None, ()
@@ -232,7 +233,7 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
     if not _stands(clip.positions, found, own):
         return None, (f"the recorded figure {told}: it is taken to lie, not to stand",)
     turn = minimal_rotation(own, found)
-    if own @ found < -0.5:  # head down: which way round, only the frames tell
+    if own @ found < -0.5:  # upside down: the rotation axis follows from the frames
         mean_turn = transform.Rotation.from_quat(clip.rotations[:, pelvis]).mean()
         fitting = [g for g in transform.Rotation.create_group("O") if g.apply(own) @ found > 0.5]
         turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
@@ -240,10 +241,10 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
 
 
 def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """The axis that is up where no rest tells: the one a figure stands along, or y or z where a floor is seen across.
+    """The up axis if the rest is unusable: the one along which the figure stands, or y or z if these have a floor.
 
     Returns:
-        The axis, and a note on a figure that lies.
+        The axis, and a note if the figure lies.
     """
     found = _signed_axis(ways.mean(axis=0))
     y, z = np.eye(3)[1:]
@@ -255,9 +256,9 @@ def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tup
 
 
 def _stands(places: NDArray[np.float64], up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether the floor is seen across one axis rather than another.
+    """Whether there is a floor normal to one axis rather than to another.
 
-    The lowest joints of somebody who stands stay where they are, at zero, or roam along the other axis.
+    The lowest joints of a standing figure keep their height, which is near zero or varies along the other axis.
     """
     size = float(np.linalg.norm(np.ptp(places[0], axis=0))) or 1.0
     low, across = ((places @ axis).min(axis=1) / size for axis in (up, other))
@@ -279,5 +280,5 @@ def _axis_name(axis: NDArray[np.float64]) -> str:
 
 
 def _degrees(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angles between vectors, shape of all but the last axis."""
+    """Angles [°] between vectors, shape of all but the last axis."""
     return np.asarray(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(-1))))

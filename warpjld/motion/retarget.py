@@ -1,25 +1,25 @@
-"""A recorded motion of another skeleton drives a rig: rotations are carried over, bone lengths stay the rig's.
+"""Retargeting of a recorded motion of another skeleton to a rig: rotations are transferred, bone lengths are the rig's.
 
-Both rest poses differ: recordings mostly rest in a T-pose, rigs in an A-pose. With R the recorded rotation of a bone
-from its rest, and A the alignment that brings the rig's rest pose to the recording's, the rig's bone turns by
+The rest poses differ: recordings mostly rest in a T-pose, rigs in an A-pose. With R the recorded rotation of a bone
+from its rest, and A the alignment of the rig's rest pose with the recording's, the rig's bone is rotated by
 
     Q(t) = W R(t) Wᵀ A
 
-where W turns the recording's axes into the rig's (up and left may be other axes there). A is built along the tree:
-starting from the parent's A, the smallest further rotation that takes the rig's rest bone to the recording's,
+where W rotates the recording's axes to the rig's (up and left may be other axes there). A is computed along the tree:
+the parent's A followed by the minimal rotation of the rig's rest bone to the recording's,
 
     A_j = minimal(A_parent d_rig → W d_recording) A_parent
 
-so a deformed limb bone points exactly where the recorded one does, and a knee or elbow keeps the plane it bends in.
-Where both have a thumb, the hand is further turned about its axis until the thumbs are on the same side. Three
-exceptions, where rest directions say more about how a skeleton was modelled than about its pose: the trunk
-(A = 1, rotations interpolated along the spine, whatever the numbers of vertebrae), the collar bones (A = 1) and the
-feet (only the heading is aligned, so that flat soles stay flat). Joints without counterpart follow their parent.
+so a limb's bone points exactly where the recorded one does, and knees and elbows keep their plane of flexion.
+If both have a thumb, the hand is further rotated about its axis until the thumbs are on the same side. There are three
+exceptions, where rest directions reflect how a skeleton was modelled more than its pose: the trunk (A = 1, rotations
+interpolated along the spine, for any numbers of vertebrae), the clavicles (A = 1) and the feet (only the heading is
+aligned, so that flat soles stay flat). Joints without counterpart follow their parent.
 
-A recording may divide a limb into parts, or move joints along or across bones: R of a limb's segment is the rotation of
-the part that a femur or humerus turns with (the last), or an elbow or shin does (the first), and further the smallest
-rotation that brings the segment to where the *joints* at its ends lie in each frame. A rest pose that is no pose is
-replaced first, see :mod:`warpjld.motion.rest_pose`.
+A recording may subdivide limbs, or move joints along or across bones: R of a limb's segment is the rotation of the last
+part of an upper arm or thigh, or the first part of a forearm or shin, followed by the minimal rotation of the segment
+to the line between the *joints* at its ends in each frame. An unusable rest pose is replaced first, see
+:mod:`warpjld.motion.rest_pose`.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ __all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]
 
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _GROUND_PERCENTILE = 10.0
-"""Feet are tracked with noise: the height they come down to is a low percentile over the clip, not its minimum."""
+"""Percentile over a clip of the lowest joint's height that counts as the floor; a minimum would follow the noise."""
 
 _FLAT = 0.3
-"""Sine of the angle between foot and shin below which a rest does not say where the foot heads."""
+"""Sine of the angle between foot and shin below which the foot's heading is undetermined at rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Retargeted:
-    """A recording on a rig.
+    """Result of retargeting a recording.
 
     Attributes:
-        poses: The rig's poses, frame after frame.
-        used: Joints of the recording that drive a joint of the rig, or carry one that does.
-        notes: What drives what, and what was guessed.
-        warnings: What looks wrong in the recording's joints.
+        poses: The rig's poses, one per frame.
+        used: Joints of the recording that drive a joint of the rig, or are ancestors of one that does.
+        notes: Which joint drives which, and assumptions.
+        warnings: Doubts about the recording's joints.
     """
 
     poses: Poses
@@ -64,15 +64,15 @@ class Retargeted:
 
 
 def correspondence(clip: Clip, skeleton: Skeleton) -> dict[str, str]:
-    """Which joint of a recording drives which joint of a rig, besides the trunk: rig's name → recording's name."""
+    """Joint names of a rig → names of the joints of a recording that drive them, except for the trunk."""
     return {skeleton.names[own]: clip.names[joint] for own, joint in pair_joints(clip, skeleton)[3].values()}
 
 
 def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
-    """Poses of a rig that follow a recording; see the module's text for the formula.
+    """Poses of a rig that follow a recording; see the module's docstring for the formula.
 
-    The root starts above where it rests and moves as the recording's does, scaled by the length of the legs (or of
-    whatever else both have). Heights are such that the feet come down to where they rest.
+    The root starts above its rest position and moves as the recording's does, scaled by the length of the legs (or of
+    all bones that both have). Heights are such that the feet come down to their rest height.
 
     Raises:
         InputError: Nothing of the recording was recognised in the rig.
@@ -81,7 +81,7 @@ def retarget(clip: Clip, skeleton: Skeleton) -> Poses:
 
 
 def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
-    """As ``retarget``, with what a reader of the result should know."""
+    """Retarget as ``retarget`` does, with the joints used, notes and warnings."""
     clip, source, target, pairs, notes = pair_joints(clip, skeleton)
     if not pairs and (source.pelvis is None or target.pelvis is None):
         raise InputError(
@@ -108,7 +108,7 @@ def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
         else:
             world[:, j] = _IDENTITY if parent < 0 else world[:, parent]
     above = -1 if trunk else int(skeleton.parents[min(j for j, _ in pairs.values())])
-    while above >= 0:  # the stub of forearm that carries a recorded hand goes with it
+    while above >= 0:  # the forearm above a hand moves with it
         world[:, above] = world[:, min(driven)]
         above = int(skeleton.parents[above])
     local = world.copy()
@@ -137,7 +137,7 @@ def _told(
     trunk: dict[int, NDArray[np.float64]],
     target: Landmarks,
 ) -> list[str]:
-    """What drives what, and which limbs and digits of the rig nothing drives."""
+    """Notes on which joint drives which, and on limbs and digits of the rig without a counterpart."""
     besides = "besides the trunk " if trunk else ""
     driven = ", ".join(f"{skeleton.names[own]} ← {clip.names[bone]}" for own, bone in pairs.values())
     notes = [f"{besides}these joints follow the recording: {driven}"] if driven else []
@@ -148,11 +148,11 @@ def _told(
 
 
 def _turned(clip: Clip, source: Landmarks, name: str, bone: int) -> NDArray[np.float64]:
-    """R of one segment: its rotation from rest in the recording's axes, shape (F, 4); see the module's text."""
+    """R of one segment: its rotation from rest in the recording's axes, shape (F, 4); see the module's docstring."""
     end = source.following(name) if name in source.joints else None
     if end is None:
         return clip.rotations[:, bone]
-    # an upper arm or thigh turns as a whole, an elbow or knee does not twist: what follows twists along the segment
+    # upper arms and thighs turn as a whole; elbows and knees do not twist: later parts twist along the segment
     part = source.last_part(name) if name.endswith((".shoulder", ".hip")) else bone
     given = rotate(clip.rotations[:, part], clip.rest[end] - clip.rest[bone])
     wanted = clip.positions[:, end] - clip.positions[:, bone]
@@ -163,7 +163,7 @@ def _turned(clip: Clip, source: Landmarks, name: str, bone: int) -> NDArray[np.f
 
 
 def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
-    """W: of the 24 rotations that turn axes into axes, the one that best turns one rest body into the other."""
+    """W: of the 24 rotations between coordinate axes, the one that best aligns the two rest bodies."""
     frames = [_body_frame(marks) for marks in (source, target)]
     if frames[0] is None or frames[1] is None:
         return _IDENTITY
@@ -173,7 +173,7 @@ def _axes(source: Landmarks, target: Landmarks) -> NDArray[np.float64]:
 
 
 def _body_frame(marks: Landmarks) -> NDArray[np.float64] | None:
-    """Columns: left, up, forward; up is along the trunk, for people may sit at rest, or else against the thighs."""
+    """Columns left, up, forward; up along the trunk, since thighs may be bent at rest, or else against the thighs."""
     thighs, trunk = marks.segment("hip", "knee", marks.rest), marks.trunk(marks.rest)
     across = next((a for part in ("hip", "shoulder") if (a := marks.across(part, marks.rest)) is not None), None)
     along = trunk if thighs is None or (trunk is not None and trunk.any()) else -thighs.sum(axis=0)
@@ -185,7 +185,7 @@ def _body_frame(marks: Landmarks) -> NDArray[np.float64] | None:
 
 
 def _trunk(source: Landmarks, target: Landmarks, recorded: NDArray[np.float64]) -> dict[int, NDArray[np.float64]]:
-    """Rotations of the rig's trunk joints, from pelvis to chest to head."""
+    """Rotations of the rig's trunk joints by index, interpolated from pelvis to chest and from chest to head."""
     ends = [(marks.pelvis, marks.chest, marks.joints.get("head")) for marks in (source, target)]
     out: dict[int, NDArray[np.float64]] = {}
     if ends[0][0] is not None and ends[1][0] is not None:
@@ -204,7 +204,7 @@ def _trunk(source: Landmarks, target: Landmarks, recorded: NDArray[np.float64]) 
 
 
 def _trunk_followed(source: Landmarks, target: Landmarks) -> set[int]:
-    """Joints of the recording's trunk that have a counterpart."""
+    """Pelvis, chest and head of the recording, as far as the rig has them, too."""
     ends = [(marks.pelvis, marks.chest, marks.joints.get("head")) for marks in (source, target)]
     return {a for a, b in zip(*ends, strict=True) if a is not None and b is not None}
 
@@ -212,7 +212,7 @@ def _trunk_followed(source: Landmarks, target: Landmarks) -> set[int]:
 def _alignment(
     name: str, source: Landmarks, target: Landmarks, axes: NDArray[np.float64], inherited: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """A of one joint, given its parent's."""
+    """A of one joint, given its parent's; see the module's docstring."""
     side, _, part = name.partition(".")
     if part == "clavicle":
         return _IDENTITY
@@ -236,7 +236,7 @@ def _alignment(
 
 
 def _turn_about(axis: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotation about an axis that brings ``start`` as close to ``end`` as it can."""
+    """Rotation about an axis that brings ``start`` as close as possible to ``end``."""
     a = unit(axis)
     u, v = start - a * (a @ start), end - a * (a @ end)
     angle = np.arctan2(a @ np.cross(u, v), u @ v)
@@ -261,7 +261,7 @@ def _travel(
     travel = (target.rest[joint] - poses.positions[:, joint] + moved)[:, None]
     if any(name.endswith(".ankle") for name in pairs):
         tips = {j for name, j in target.joints.items() if ".toe" in name and not name.endswith(".base")}
-        # all joints, for people kneel and stand on their hands; but toes' tips dig into the floor where shoes bend less
+        # all joints, as in kneeling or handstands, but toe tips: rigid toes would reach below the floor
         down = [j for j in range(len(target.rest)) if j not in tips]
         heights = (poses.positions[:, down, 1] + travel[..., 1]).min(axis=1)
         travel[..., 1] += target.rest[down, 1].min() - np.percentile(heights, _GROUND_PERCENTILE)
@@ -269,7 +269,7 @@ def _travel(
 
 
 def _scale(source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int]]) -> tuple[float, tuple[str, ...]]:
-    """Size of the rig in the recording's units, by its legs or else by what both have, and a note on the latter."""
+    """Ratio of the rig's size to the recording's, by the legs or else all common bones, and a note on the latter."""
     legs = [name for name in pairs if name.endswith((".hip", ".knee"))]
     lengths = []
     for marks in (source, target):

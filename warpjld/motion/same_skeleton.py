@@ -1,4 +1,4 @@
-"""Which joints of an animation's file are a rig's own: by names, by place in the tree where names are doubled."""
+"""Matching of an animation's joints with a rig's own: by names, and by place in the tree for duplicate names."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["match_joints", "same_bones", "same_rest"]
 
 _SAME = 1e-4
-"""Rest transforms that differ by less, relative to the skeleton's size, are those of one skeleton."""
+"""Largest difference of rest transforms of one skeleton, per size of the skeleton."""
 _SAME_BONE = 1e-2
-"""Likewise offsets of joints in their parents' frames, relative to the longest: other exporters, other rest poses."""
+"""Largest difference of joint offsets in their parents' frames, per longest offset; for other exporters or rest
+poses."""
 
 
 def match_joints(theirs: SourceTree, own: SourceTree) -> NDArray[np.int64]:
     """Joint of ``theirs`` for each of ``own``, -1 where there is none, shape (N,).
 
-    Names are compared as they are, and without case, name space and punctuation, which exporters change; what finds
-    more joints counts. Doubled names are told apart by their place in the tree and the order of siblings.
+    Names are compared exactly, and without case, namespace and punctuation, which exporters change; the comparison that
+    matches more joints is used. Duplicate names are distinguished by place in the tree and order of siblings.
     """
     if theirs.names == own.names and np.array_equal(theirs.parents, own.parents):
         return np.arange(len(own))
     ways = (
         _match([plain(n) for n in theirs.names], [plain(n) for n in own.names], theirs, own) for plain in (str, _plain)
     )
-    return max(ways, key=lambda found: int((found >= 0).sum()))  # of equals the first: names as they are
+    return max(ways, key=lambda found: int((found >= 0).sum()))  # the first, exact names, if equal
 
 
 def _match(their_names: list[str], own_names: list[str], theirs: SourceTree, own: SourceTree) -> NDArray[np.int64]:
@@ -39,12 +40,12 @@ def _match(their_names: list[str], own_names: list[str], theirs: SourceTree, own
     out = np.array([their_names.index(n) if count[n] == 1 == their_count[n] else -1 for n in own_names])
     if (out >= 0).all() or not any(their_count[n] for n in own_names):
         return out
-    below: list[list[int]] = [[] for _ in range(len(theirs) + 1)]  # the last holds the roots
+    below: list[list[int]] = [[] for _ in range(len(theirs) + 1)]  # children by node; the last entry holds the roots
     for k, parent in enumerate(theirs.parents):
         below[parent].append(k)
 
     def children(node: int) -> dict[str, list[int]]:
-        """Nearest nodes below one of ``theirs`` that have a name of the rig's, by name."""
+        """Nearest descendants of a node of ``theirs`` with a name that the rig has, by name."""
         found: dict[str, list[int]] = {}
         todo = list(below[node])
         while todo:
@@ -57,7 +58,7 @@ def _match(their_names: list[str], own_names: list[str], theirs: SourceTree, own
 
     roots = [j for j, parent in enumerate(own.parents) if parent < 0]
     best: dict[int, int] = {}
-    for start in (-1, *range(len(theirs))):  # under which node the rig's roots are the same tree
+    for start in (-1, *range(len(theirs))):  # candidate parents of the rig's roots
         pairs: dict[int, int] = {}
         todo = [(roots, start)]
         while todo:
@@ -86,16 +87,16 @@ def _plain(name: str) -> str:
 def same_rest(
     theirs: NDArray[np.float64], own: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """What brings rest transforms of matched joints (K, 4, 4) on those of a rig; None where nothing does.
+    """Maps between rest transforms of matched joints (K, 4, 4) and those of a rig; None if they do not fit.
 
     Returns:
-        Maps (4, 4) of the world and of joint frames: ``world @ theirs @ frame`` is ``own``. One exporter scales joints'
-        places, another the node above them, which scales their frames too; so the second is a scale.
+        Maps (4, 4) of the world and of joint frames with ``world @ theirs @ frame`` = ``own``. Some exporters scale
+        joint positions, others the node above, which scales joint frames, too; so the second map is a scale.
     """
     middle = [frames[:, :3, 3] - frames[:, :3, 3].mean(axis=0) for frames in (theirs, own)]
     spread = [float(np.linalg.norm(places)) for places in middle]
     sizes = np.abs(np.linalg.det(own[:, :3, :3]))
-    reference = int(np.argmax(sizes > 1e-3 * sizes.max()))  # none that is collapsed
+    reference = int(np.argmax(sizes > 1e-3 * sizes.max()))  # the first with a non-singular frame
     linear = own[reference, :3, :3] @ np.linalg.inv(theirs[reference, :3, :3])
     factor = float(np.abs(np.linalg.det(linear)) ** (1.0 / 3.0))
     scale = spread[1] / spread[0] if len(own) > 1 and min(spread) > 0.0 else factor
@@ -112,17 +113,16 @@ def same_rest(
 def same_bones(
     theirs: NDArray[np.float64], own: NDArray[np.float64], parents: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], float] | None:
-    """Whether matched joints are the same bones in another rest pose.
+    """Whether matched joints have the same bones, in another rest pose.
 
     Args:
         theirs: Rest transforms in the animation's file, shape (K, 4, 4).
-        own: Those of the rig.
-        parents: Parent of each, -1 for the root, shape (K,).
+        own: Rest transforms of the rig, shape (K, 4, 4).
+        parents: Parent of each joint, -1 for the root, shape (K,).
 
     Returns:
-        What brings their world on the rig's, (4, 4): a scale and a quarter turn or none, since another up axis is the
-        only thing that files of one skeleton disagree in; and by how much lengths in joint frames are multiplied. None
-        where bones differ.
+        The map of their world to the rig's, (4, 4), a scale and possibly a quarter turn (files of one skeleton differ
+        in their up axis only), and the factor for lengths in joint frames. None if the bones differ.
     """
     below = np.flatnonzero(parents >= 0)
     if len(below) < 3 or (parents < 0).sum() != 1:

@@ -1,4 +1,4 @@
-"""Hands that a detector saw, frame by frame, each by itself → one track a hand, its gaps bridged."""
+"""Assembly of hands detected independently per frame into one track per hand, with gaps interpolated."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from warpjld.motion.hand_track import HandTrack
 __all__ = ["SeenHand", "recording_of"]
 
 _SURE = 0.5
-"""Confidence, 0 to 1, below which a landmark or a hand counts as lost: the default of MediaPipe."""
+"""Confidence, 0 to 1, below which a landmark or hand counts as lost; MediaPipe's default."""
 _FEW = 0.2
-"""Part of the frames up to which the rarer label of a hand that is always alone is a mistake."""
+"""Largest share of frames in which a single hand's less frequent label counts as a detection error."""
 
 
 @dataclass(frozen=True, eq=False)
 class SeenHand:
-    """A hand in one frame.
+    """A hand detected in one frame.
 
     Attributes:
         points: Its L landmarks, shape (L, 3).
-        sure: Confidence in each, 0 to 1, shape (L,).
-        side: ``left`` or ``right``, or None where the detector does not say.
+        sure: Confidence in each landmark, 0 to 1, shape (L,).
+        side: ``left`` or ``right``, or None without a label.
         score: Confidence in the hand.
-        slot: Its place among the hands of its frame.
+        slot: Its index among the hands of its frame.
     """
 
     points: NDArray[np.float64]
@@ -48,20 +48,20 @@ def recording_of(
     rate: float,
     notes: list[str],
 ) -> HandRecording:
-    """Tracks of the hands that were seen, told apart by their labels, or by their order where there are none.
+    """Tracks of the detected hands, identified by their labels, or by their order if they have none.
 
-    A hand below a confidence of one half, or with less than half of its landmarks above, is lost in that frame; single
-    landmarks below it are interpolated between the frames before and after.
+    A hand is lost in frames with a confidence below one half, or where at most half of its landmarks reach that; single
+    landmarks below it are interpolated over time.
 
     Args:
         seen: The hands of every frame.
-        joints: What the landmarks are, names without side.
+        joints: Joint names of the landmarks, without side.
         times: Times of the frames [s].
         rate: Frames a second.
-        notes: What the reader assumed already.
+        notes: The reader's notes so far.
 
     Raises:
-        InputError: No hand at all, or some with and some without a label.
+        InputError: No hand at all, a landmark that is never visible, or labels of some hands only.
     """
     kept = [[one for one in hands if one.score >= _SURE and (one.sure >= _SURE).mean() > 0.5] for hands in seen]
     if not any(kept):
@@ -113,7 +113,7 @@ def recording_of(
 
 
 def _one_label(seen: list[list[SeenHand]], notes: list[str]) -> list[list[SeenHand]]:
-    """A hand that is always alone and now and then called the other one is one hand."""
+    """Correct occasional wrong labels of a hand that is always alone."""
     labels = Counter(one.side for hands in seen for one in hands if one.side is not None)
     if len(labels) < 2 or max(len(hands) for hands in seen) > 1:
         return seen

@@ -12,28 +12,27 @@ __all__ = ["Spline"]
 
 
 class Spline:
-    """A cubic through keys, with tension t, continuity c and bias b at every key.
+    """An interpolating cubic spline, with tension t, continuity c and bias b at every key.
 
     With the chords p = v[i] - v[i-1] and n = v[i+1] - v[i], the tangents that arrive at and leave key i are
 
         arriving = (1-t)(1-c)(1+b)/2 p + (1-t)(1+c)(1-b)/2 n
         leaving  = (1-t)(1+c)(1+b)/2 p + (1-t)(1-c)(1-b)/2 n
 
-    per interval; both are divided by the mean length of the two intervals, which is the paper's adjustment for keys
-    that are not evenly spaced: the speed is continuous where c = 0, and keys on a straight line give that line.
-    At the first and last key the missing chord is the mirror image of the present one. Outside the keys the value
-    of the nearest key holds.
+    per interval; both are divided by the mean length of the two intervals, the paper's adjustment for unevenly spaced
+    keys: the speed is continuous where c = 0, and keys on a straight line give that line. At the first and last key the
+    missing chord is the mirror image of the present one. Outside the keys the spline is constant.
 
     Between two equal neighbouring keys that both have the default constants the value is held, instead of the small
-    swing the formula would give; constants other than zero, or ``hold=False``, give the formula everywhere.
+    overshoot of the formula; constants other than zero, or ``hold=False``, give the formula everywhere.
 
     Args:
         times: Key times, finite and increasing, shape (K,).
         values: Key values, shape (K,).
-        tension: 1 stops at the key, -1 rushes through it; a number or one for each key.
-        continuity: Anything but 0 makes a corner.
+        tension: 1 stops at the key, -1 passes it fast; a number or one per key.
+        continuity: Values other than 0 make a corner.
         bias: 1 overshoots after the key, -1 before it.
-        hold: Whether equal neighbours hold.
+        hold: Whether the value is held between equal neighbours.
 
     Raises:
         InputError: No keys, wrong shapes, values not finite, times not increasing.
@@ -66,7 +65,7 @@ class Spline:
         self._cubics = _cubics(x, v, t, c, b, hold) if len(x) > 1 else None
 
     def __call__(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Values at any times, in their shape."""
+        """Values at any times, in the shape of ``times``."""
         at = np.clip(np.asarray(times, dtype=np.float64), self.times[0], self.times[-1])
         if self._cubics is None:
             return np.full(at.shape, self.values[0])
@@ -74,7 +73,7 @@ class Spline:
         return np.asarray(((a * s + b) * s + c) * s + d)
 
     def derivative(self, times: ArrayLike) -> NDArray[np.float64]:
-        """Slopes inside the keys, in the shape of ``times``; at a key that of the interval after it."""
+        """Slopes at times within the keys, in the shape of ``times``; at a key that of the interval after it."""
         at = np.asarray(times, dtype=np.float64)
         if self._cubics is None:
             return np.zeros(at.shape)
@@ -82,7 +81,7 @@ class Spline:
         return np.asarray((3.0 * a * s + 2.0 * b) * s + c)
 
     def _at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Coefficients of the cubics that hold at these times, cubes first, and the times since their keys."""
+        """Coefficients of the cubics at these times, highest power first, and the times since their keys."""
         assert self._cubics is not None
         k = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
         return self._cubics[:, k], times - self.times[k]

@@ -1,4 +1,4 @@
-"""Times of frames as scripts and libraries write them: stamps in some unit, or a rate, or nothing."""
+"""Frame times as scripts and libraries write them: timestamps in some unit, a rate, or neither."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from warpjld.errors import InputError
 
 __all__ = ["DEFAULT_RATE", "stated_times"]
 
-DEFAULT_RATE = 30.0  # frames a second, said in a note where it is taken
+DEFAULT_RATE = 30.0  # frames a second; its use is noted
 
 _RATES = ("fps", "rate", "frame_rate", "framerate", "frameRate", "mocap_framerate", "mocap_frame_rate")
 _UNITS = {"_ms": 1e-3, "Ms": 1e-3, "_us": 1e-6, "_ns": 1e-9, "_s": 1.0, "_sec": 1.0}
@@ -23,19 +23,19 @@ _STAMPS = tuple(f"{stem}{unit}" for stem in ("timestamp", "timestamps", "time", 
 def stated_times(
     about: Mapping[str, Any], frames: Sequence[Mapping[str, Any]], rate: float | None, notes: list[str]
 ) -> tuple[NDArray[np.float64], float]:
-    """Times [s] of all frames from the first, shape (F,), and how many there are a second.
+    """Times [s] of all frames since the first, shape (F,), and frames a second.
 
-    A stamp whose name does not say its unit is in seconds, milliseconds or microseconds, whichever gives steps of a
-    camera: frames less than 2 apart are in seconds, less than 2000 apart in milliseconds.
+    Timestamps whose names do not state a unit are in seconds, milliseconds or microseconds, by their typical step: less
+    than 2, less than 2000, or more.
 
     Args:
-        about: What the file says of all frames.
-        frames: What it says of each.
-        rate: Frames a second where it says nothing; None for 30, with a note.
-        notes: Assumptions are added here.
+        about: Fields of the file for all frames.
+        frames: Fields of each frame.
+        rate: Frames a second if the file states nothing; None for 30, with a note.
+        notes: Notes on assumptions are appended.
 
     Raises:
-        InputError: A time that is not after the one before, or a rate that is none.
+        InputError: Timestamps that do not increase, or a rate that is not positive.
     """
     count = len(frames)
     stamps, unit = _stamps(about, frames)
@@ -67,9 +67,9 @@ def stated_times(
 def _stamps(
     about: Mapping[str, Any], frames: Sequence[Mapping[str, Any]]
 ) -> tuple[NDArray[np.float64] | None, float | None]:
-    """The stamps as the file has them, and their unit [s] where their name says it.
+    """The timestamps in the file's unit, and that unit [s] if their name states it.
 
-    Frames without one, as those in which nothing was seen may be, get the times between their neighbours'.
+    Those of frames without one (where nothing was detected, for example) are interpolated or extrapolated.
     """
     for key in _STAMPS:
         values = about.get(key)

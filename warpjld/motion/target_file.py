@@ -1,12 +1,12 @@
-"""Files of target shapes: poses, and where the vertices of a rig shall be in them (NumPy, ``.npz``).
+"""Target shapes of a rig: poses with desired vertex positions, in a NumPy archive (``.npz``).
 
 Arrays of the archive, F frames:
 
 - ``vertices`` (F, W, 3) [m]: in the vertex order and frame of the rig's file, as ``warpjld deform`` writes ``.npz``
 - ``channels`` (C,): names as the headings of motion CSV files, such as ``index.base.flexion`` or ``root.x``
-- ``angles`` (F, C): degrees; metres of ``root.x``, ``root.y`` and ``root.z``
+- ``angles`` (F, C): degrees; for ``root.x``, ``root.y`` and ``root.z`` metres
 
-The last two may be left out where a motion file of F frames gives the poses. Other arrays are not looked at.
+The last two may be missing if a motion file of F frames gives the poses. Other arrays are ignored.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ __all__ = ["Targets", "read_targets"]
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What a rig shall look like.
+    """Target shapes of a rig.
 
     Attributes:
         poses: F poses of the rig.
-        vertices: Welded vertices in them [m], shape (F, V, 3).
-        warnings: What of a motion the rig does not follow.
+        vertices: Positions of the welded vertices in these poses [m], shape (F, V, 3).
+        warnings: What of a motion is not followed.
     """
 
     poses: Poses
@@ -50,12 +50,12 @@ def read_targets(path: str | Path, rig: Rig, *, motion: str | Path | None = None
 
     Args:
         path: The file.
-        rig: Whose surface and joints.
+        rig: The rig.
         motion: Motion file with a pose for every shape, instead of ``channels`` and ``angles``.
 
     Raises:
-        InputError: No such file; an array is missing, of another shape or not finite; no such joint or an angle beyond
-            its limit; as many poses as shapes are wanted.
+        InputError: No such file; an array is missing, of wrong shape or not finite; an unknown joint or an angle beyond
+            its limit; a number of poses other than that of shapes.
     """
     path = Path(path)
     if path.suffix.lower() != ".npz":
@@ -82,7 +82,7 @@ def _vertices(arrays: dict[str, NDArray], rig: Rig) -> NDArray[np.float64]:
     if not np.isfinite(array).all():
         frame, vertex, _ = np.argwhere(~np.isfinite(array))[0]
         raise InputError(f"'vertices': vertex {vertex} is not finite at frame {frame}")
-    # source vertices that are one point of the surface: their mean
+    # mean over source vertices that are welded into one
     share = 1.0 / np.bincount(surface.weld, minlength=len(surface.vertices))[surface.weld]
     mean = sp.csr_array((share, (surface.weld, np.arange(count))), shape=(len(surface.vertices), count))
     return np.stack([mean @ shape for shape in array])

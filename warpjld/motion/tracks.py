@@ -1,4 +1,4 @@
-"""Tracks: the keys of one channel; and motions: tracks that together move a skeleton (R2–R5)."""
+"""Key-framed motions: tracks of keys per channel, and sampling them as poses (R2–R5)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 __all__ = ["Clamped", "Key", "Limits", "Motion", "Track"]
 
 Limits = Literal["error", "clamp", "ignore"]
-"""What to do where an angle is beyond its joint's limits."""
+"""Treatment of angles beyond their joint's limits."""
 
 _ROUNDING = 1e-9
-"""Angles [rad] this far beyond a limit are at the limit: degrees and radians do not convert exactly."""
+"""Excess over a limit [rad] that is ignored: conversion between degrees and radians is not exact."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Key:
 
 
 class Track:
-    """Keys of one channel, in any order of setting."""
+    """The keys of one channel; they may be set in any order."""
 
     def __init__(self, channel: str) -> None:
         self.channel = channel
@@ -44,7 +44,7 @@ class Track:
         self._spline: Spline | None = None
 
     def set(self, key: Key) -> None:
-        """Add a key; it replaces one at the same frame."""
+        """Add a key, or replace the one at its frame."""
         self._keys[key.frame] = key
         self._spline = None
 
@@ -55,7 +55,7 @@ class Track:
 
     @property
     def keys(self) -> tuple[Key, ...]:
-        """The keys, frames increasing."""
+        """The keys, by increasing frame."""
         return tuple(self._keys[frame] for frame in sorted(self._keys))
 
     @property
@@ -69,12 +69,12 @@ class Track:
 
 @dataclass(frozen=True)
 class Clamped:
-    """In-betweens of a channel that went past a limit and were held there.
+    """Interpolated values of a channel that exceeded a limit and were held at it.
 
     Attributes:
         channel: ``joint.channel`` with the joint's full name.
-        frames: First and last frame concerned.
-        worst: The value [rad] farthest beyond.
+        frames: First and last frame with such values.
+        worst: The most excessive value [rad].
         limit: The limit [rad].
     """
 
@@ -93,7 +93,7 @@ class Clamped:
 
 @dataclass(eq=False)
 class Motion:
-    """Tracks, a rate and the constants of keys that do not bring their own.
+    """Tracks, a frame rate, and default constants of keys.
 
     Attributes:
         rate: Frames a second.
@@ -137,7 +137,7 @@ class Motion:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> None:
-        """Set a key; a key already at that frame is replaced.
+        """Set a key, or replace the one at its frame.
 
         Args:
             channel: ``joint.channel`` or ``root.x|y|z``, or an alias: ``metacarpus.flexion``, ``joint 14.flexion``.
@@ -161,8 +161,8 @@ class Motion:
             self.tracks.setdefault(name, Track(name)).set(key)
 
     def value(self, channel: str, frame: ArrayLike, initial: float = 0.0) -> NDArray[np.float64]:
-        """Values [rad or m] at any key or in-between frame (R4), in the shape of ``frame``; ``initial`` if nothing is
-        keyed.
+        """Values [rad or m] at any frame, between keys, too (R4), in the shape of ``frame``; ``initial`` for a channel
+        without keys.
 
         The side may be left out where only one side has keys.
         """
@@ -175,7 +175,7 @@ class Motion:
 
     @property
     def frame_range(self) -> tuple[float, float]:
-        """First and last frame; (0, 0) without any key."""
+        """First and last frame; (0, 0) without keys."""
         if self.span is not None:
             return self.span
         frames = [key.frame for track in self.tracks.values() for key in track.keys]
@@ -183,7 +183,7 @@ class Motion:
 
     @property
     def frames(self) -> NDArray[np.float64]:
-        """Every frame from first to last, one apart, shape (F,)."""
+        """All frames from first to last, with a step of 1, shape (F,)."""
         first, last = self.frame_range
         return frame_times(first, last, 1.0)
 
@@ -192,12 +192,12 @@ class Motion:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Angles [rad], shape (F, J, 4), and displacements of the root [m], shape (F, 3), at F frames.
 
-        In-betweens that swing past a limit are held at it, unless limits are ignored; ``clamped`` tells which.
+        Interpolated values that exceed a limit are held at it, unless limits are ignored; see ``clamped``.
 
         Args:
             frames: Frame numbers, whole or not, shape (F,).
-            skeleton: Whose joints and limits.
-            limits: Keys beyond a limit: ``error`` refuses them, ``clamp`` holds them at it, ``ignore`` lets them be.
+            skeleton: Skeleton with the joints and limits.
+            limits: Keys beyond a limit: ``error`` rejects them, ``clamp`` holds them at it, ``ignore`` uses them.
 
         Raises:
             InputError: A joint the skeleton does not have, two tracks of one channel, or a key beyond its limit.
@@ -212,7 +212,7 @@ class Motion:
         return angles, root
 
     def clamped(self, frames: ArrayLike, skeleton: Skeleton) -> tuple[Clamped, ...]:
-        """What ``sample`` holds at a limit over these frames, by channel."""
+        """Values that ``sample`` holds at a limit over these frames, by channel."""
         at = np.atleast_1d(np.asarray(frames, dtype=np.float64))
         found = []
         for track, (joint, channel) in self._places(skeleton).items():

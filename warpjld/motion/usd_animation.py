@@ -1,7 +1,7 @@
-"""UsdSkel animations, sampled at frames.
+"""Reader of UsdSkel animations, sampled at frames.
 
-A skeleton moves by the SkelAnimation bound to it, or by the one chosen by name. Joints that the animation does not
-name rest; where the skeleton itself, or what it hangs on, moves, its joints go with it.
+A skeleton is moved by the SkelAnimation bound to it, or by the one chosen by name. Joints that the animation does not
+contain stay at rest; if the skeleton or an ancestor is animated, its joints move with it.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 
 __all__ = ["read_usd_animation", "usd_animation_names"]
 
-_TINY = 1e-7  # stands for zero scale, which has no rotation
+_TINY = 1e-7  # replaces zero scale, which would leave no rotation
 _FASTEST = 240.0
-"""Time codes a second up to which a time code is a frame; more are ticks."""
+"""Largest number of time codes per second at which a time code counts as a frame; with more it is a tick."""
 
 
 def usd_animation_names(path: str | Path) -> tuple[str, ...]:
     """Names of a stage's SkelAnimations, those bound to its skeletons first.
 
     Raises:
-        InputError: No USD file.
+        InputError: Not a USD file.
         MissingExtraError: OpenUSD is not installed.
     """
     from warpjld.io.usd.skeletons import read_skeletons
@@ -47,15 +47,15 @@ def usd_animation_names(path: str | Path) -> tuple[str, ...]:
 
 
 def read_usd_animation(path: str | Path, *, rate: float | None = None, name: str | None = None) -> JointAnimation:
-    """An animation of a USD stage, over the stage's time codes, or over the animation's where it states none.
+    """An animation of a USD stage, over the stage's time codes, or those of the animation if the stage states none.
 
     Args:
         path: A .usd, .usda, .usdc or .usdz file with a skeleton and an animation.
-        rate: Frames a second; None for the stage's time codes a second (its frames, where those are ticks).
-        name: Which animation, in any case; None for those that are bound to the skeletons.
+        rate: Frames a second; None for the stage's time codes per second (its frames per second where these are ticks).
+        name: Name of the animation, in any case; None for those bound to the skeletons.
 
     Raises:
-        InputError: No USD file, no skeleton, no animation or none of that name, or broken samples.
+        InputError: Not a USD file, no skeleton, no animation or none of that name, or invalid samples.
         MissingExtraError: OpenUSD is not installed.
     """
     from warpjld.io.usd.skeletons import read_skeletons
@@ -89,7 +89,7 @@ def _no_skeleton(file: UsdFile) -> str:
 
 
 def _animations(file: UsdFile, skeletons: tuple[UsdSkeleton, ...]) -> dict[str, set[str]]:
-    """Paths of the SkelAnimations by name, those of a prototype's instances together, bound ones first."""
+    """Paths of the SkelAnimations by name, bound ones first; instances of one prototype share a name."""
     from pxr import UsdSkel
 
     bound = {str(one.animation.GetPath()) for one in skeletons if one.animation}
@@ -106,7 +106,7 @@ def _animations(file: UsdFile, skeletons: tuple[UsdSkeleton, ...]) -> dict[str, 
 def _chosen(
     file: UsdFile, skeletons: tuple[UsdSkeleton, ...], name: str | None
 ) -> tuple[str, list[Any], tuple[str, ...]]:
-    """Title, the SkelAnimation of every skeleton or None, and notes."""
+    """Title, the SkelAnimation of every skeleton (or None), and notes."""
     animations = _animations(file, skeletons)
     if not animations:
         raise InputError("no animation in this file: its skeleton rests", path=file.path)
@@ -175,7 +175,7 @@ def _attributes(animation: Any) -> list[Any]:
 
 
 def _moves_at(prim: Any) -> list[float]:
-    """Time codes at which a prim, or what it hangs on, is placed anew."""
+    """Time codes at which the transform of a prim or an ancestor has samples."""
     from pxr import UsdGeom
 
     times: list[float] = []
@@ -215,7 +215,7 @@ def _worlds(
 def _locals(
     file: UsdFile, skeleton: UsdSkeleton, animation: Any, codes: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Joint-to-parent transforms, shape (F, J, 4, 4), and the same with axes that are not mirrored."""
+    """Joint-to-parent transforms, shape (F, J, 4, 4), and the same without mirroring by negative scale."""
     out = np.repeat(skeleton.local_rest[None], len(codes), axis=0)
     if not animation:
         return out, out
@@ -252,7 +252,7 @@ def _locals(
 def _samples(
     file: UsdFile, animation: Any, attribute: Any, codes: NDArray[np.float64], still: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Values of an attribute at time codes, shape (F, J, 3) or (F, J, 4); ``still`` where it has none."""
+    """Values of an attribute at time codes, shape (F, J, 3) or (F, J, 4); ``still`` if it has none."""
     at = codes.tolist() if attribute.ValueMightBeTimeVarying() else codes[:1].tolist()
     values = []
     for code in at:

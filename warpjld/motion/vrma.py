@@ -1,4 +1,4 @@
-"""VRM animations (.vrma): glTF animations of a person's bones, which the file itself names."""
+"""Reader of VRM animations (.vrma): glTF animations of a humanoid's bones, which the file names in a table."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ _FINGER = {"base": 1, "knuckle2": 2, "knuckle3": 3}
 
 
 def read_vrma(path: str | Path, *, rate: float | None = None, name: str | None = None) -> JointAnimation:
-    """An animation of a .vrma file, its joints in Mixamo's names, whatever their nodes are called.
+    """An animation of a .vrma file, its joints under Mixamo's names, independent of the nodes' names.
 
-    The file's rest pose is a T-pose. Facial expressions and the direction of the eyes are not followed.
+    The file's rest pose is a T-pose. Facial expressions and the eyes' direction are ignored.
 
     Args:
         path: The file.
         rate: Frames a second; None for the file's own.
-        name: Which of its animations; None for the first.
+        name: Name of the animation; None for the first.
 
     Raises:
-        InputError: No glTF, no ``VRMC_vrm_animation``, or broken data.
+        InputError: Not a glTF file, no ``VRMC_vrm_animation``, or invalid data.
     """
     from warpjld.io.gltf.document import open_document
     from warpjld.io.gltf.skin import joint_nodes

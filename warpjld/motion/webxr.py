@@ -1,4 +1,4 @@
-"""WebXR hand poses: named poses of 25 joints, each a 4 × 4 matrix in metres, stored by columns."""
+"""Reader of WebXR hand poses: named poses of 25 joints, each a 4 × 4 matrix in metres, stored by columns."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ WEBXR_JOINTS = {"wrist": "wrist"} | {
 
 
 def is_webxr(content: Any) -> bool:
-    """Whether JSON holds poses of WebXR joints: a wrist, at most two levels below the top."""
+    """Whether JSON content holds poses of WebXR joints: a ``wrist``, at most two levels below the top."""
     return isinstance(content, Mapping) and any(True for _ in _poses(content))
 
 
 def webxr_hands(content: Mapping[str, Any]) -> HandRecording:
-    """Poses in the file's order, a second apart.
+    """Poses in the file's order, at a rate of one a second.
 
-    The format has no place for the side. It is taken from a ``handedness`` beside the poses or inside one, from keys
-    ``left`` and ``right`` above the poses or inside one, or from the poses' names (``left fist``, ``fist_L``) where all
-    tell it; else it is left open. Poses are relative to a controller's grip, so only the fingers count.
+    The format does not store the side. It is taken from a ``handedness`` field beside or inside the poses, from keys
+    ``left`` and ``right`` above or inside the poses, or from the poses' names (``left fist``, ``fist_L``) if all state
+    it; otherwise it is unknown. Poses are relative to a controller's grip, so only the fingers are used.
 
     Raises:
-        InputError: A joint is missing or its matrix is not one, by name; or sides contradict each other.
+        InputError: A joint is missing or its matrix is invalid, with its name; or contradictory sides.
     """
     stated = _side(content.get("handedness"), "the file")
     found: dict[str | None, dict[str, Mapping[str, Any]]] = {}
@@ -68,7 +68,7 @@ def webxr_hands(content: Mapping[str, Any]) -> HandRecording:
 
 
 def _poses(content: Mapping[str, Any]) -> Iterator[tuple[str, str | None, Mapping[str, Any]]]:
-    """Name of every pose, its side where a key says it, and its joints."""
+    """Name of every pose, its side if a key states it, and its joints."""
     for name, entry in content.items():
         if not isinstance(entry, Mapping):
             continue
@@ -92,7 +92,7 @@ def _named_side(name: str) -> str | None:
 
 
 def _side(stated: Any, where: str) -> str | None:
-    if stated is None or stated in ("", "none"):  # WebXR calls a hand that it does not know the side of "none"
+    if stated is None or stated in ("", "none"):  # "none" is WebXR's value for an unknown side
         return None
     side = _SIDES.get(str(stated).lower())
     if side is None:

@@ -1,1 +1,1 @@
-"""Processes, threads, and libraries that are imported when they are first wanted."""
+"""Worker processes, threads, and lazily imported libraries."""

@@ -1,4 +1,4 @@
-"""Libraries that are imported when they are first wanted: a command starts quickly that needs few of them."""
+"""Lazy imports, so that commands which need few libraries start quickly."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ __all__ = ["imported", "lazy_module"]
 
 
 def imported(place: tuple[str, str]) -> Any:
-    """What ``(module, name)`` names, its module imported now: for tables of what does each kind of file."""
+    """The object that ``(module, name)`` refers to, imported now; for tables of readers and writers by suffix."""
     module, name = place
     return getattr(import_module(module), name)
 
 
 def lazy_module(name: str) -> Any:
-    """A module that is imported when something of it is first asked for.
+    """A proxy of a module that is imported when one of its attributes is first used.
 
-    SciPy's take a quarter of a second and more each, as long as a kept binding takes to deform a clip.
+    Importing a SciPy module takes a quarter of a second or more, as long as deforming a clip with a stored binding.
     """
     return _LazyModule(name)
 
@@ -28,5 +28,5 @@ class _LazyModule:
 
     def __getattr__(self, attribute: str) -> Any:
         found = getattr(import_module(self._name), attribute)
-        setattr(self, attribute, found)  # from now on it is an attribute like any other
+        setattr(self, attribute, found)  # later accesses bypass __getattr__
         return found

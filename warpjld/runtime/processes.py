@@ -1,4 +1,4 @@
-"""Jobs over processes. Whatever happens to a worker, every job ends with a status."""
+"""Parallel jobs in worker processes; every job ends with a status, even if its worker crashes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from warpjld.errors import WarpjldError
 
 __all__ = ["LIVES", "THREAD_VARIABLES", "BlockWork", "Work", "Workers", "one_thread", "run_jobs", "worker_pool"]
 
-_AHEAD = 2  # jobs handed out for each process: keeps it busy, and few are suspected when it dies
-LIVES = 2  # times a job may kill a worker that has nothing else to do
-_WATCH = 1.0  # seconds between looks at whether all workers live
-_PATIENCE = 5.0  # seconds that a worker has to put away what it was writing
+_AHEAD = 2  # jobs submitted per process: keeps it busy, and leaves few to suspect after a crash
+LIVES = 2  # number of crashes of a worker on its own after which a job is given up
+_WATCH = 1.0  # interval of checks whether all workers are alive [s]
+_PATIENCE = 5.0  # time for a terminated worker to remove temporary files [s]
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -39,19 +39,19 @@ Each = TypeVar("Each")
 
 
 class Work(Protocol[Job]):
-    """One kind of job; it is pickled once to each worker. Results are kept on disk, by the worker itself."""
+    """A kind of job, pickled once to each worker. Workers store results on disk themselves."""
 
     def begin(self) -> None:
         """Called once in every worker, before its first job."""
 
     def do(self, job: Job) -> str:
-        """Do a job in a worker and keep what comes of it; returns its status."""
+        """Do a job in a worker and store its result; returns its status."""
 
     def kept(self, job: Job) -> str | None:
-        """Status of a job whose result is kept already, else None."""
+        """Status of a job whose result is stored already, else None."""
 
     def bury(self, job: Job) -> str:
-        """Keep that a job ended its process, twice; returns its status."""
+        """Record that a job crashed its process repeatedly; returns its status."""
 
 
 @runtime_checkable
@@ -66,20 +66,20 @@ class BlockWork(Work[Each], Protocol[Each]):
 
 
 def run_jobs(work: Work[Job], jobs: Iterable[Job], *, processes: int, done: Callable[[Job, str], None]) -> None:
-    """Do jobs, in blocks where ``work`` is a ``BlockWork``.
+    """Run jobs in worker processes, in blocks where ``work`` is a ``BlockWork``.
 
-    When a worker dies (killed, out of memory, crashed), all that was handed out is done again one by one in a process
-    of its own; a job that kills it twice is buried, and the rest goes on.
+    If a worker dies (killed, out of memory, crashed), all submitted jobs are repeated one by one in a process of their
+    own; a job that crashes it twice is recorded as crashed, and the others continue.
 
     Args:
-        work: What is done.
-        jobs: What it is done to.
-        processes: Workers, 1 or more.
+        work: The kind of job.
+        jobs: The jobs.
+        processes: Number of workers, 1 or more.
         done: Called with every finished job and its status.
 
     Raises:
-        WarpjldError: Workers do not even start, or what ``Work.do`` raises.
-        KeyboardInterrupt: As soon as it comes: jobs that are being done are given up.
+        WarpjldError: Workers do not start, or an error raised by ``Work.do``.
+        KeyboardInterrupt: Immediately; running jobs are abandoned.
     """
     waiting = deque(work.blocks(jobs, processes) if isinstance(work, BlockWork) else ([job] for job in jobs))
     with one_thread():
@@ -90,9 +90,9 @@ def run_jobs(work: Work[Job], jobs: Iterable[Job], *, processes: int, done: Call
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Processes spawned meanwhile compute on one thread: libraries read these variables when they load.
+    """Context in which spawned processes use one thread for numerical libraries, by environment variables.
 
-    Besides not fighting over cores, this is what makes sums come out in the same order everywhere.
+    This avoids contention for cores, and makes the order of summation reproducible.
     """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
@@ -107,10 +107,10 @@ def one_thread() -> Iterator[None]:
 
 
 class Workers:
-    """Workers of a pool, watched over.
+    """The workers of a pool, with supervision.
 
-    A pool of Python 3.11 misses the death of a worker that it started while nothing else happened, and then waits for
-    its result for ever; here deaths are looked for, too.
+    A pool of Python 3.11 does not notice the death of a worker that was started while the pool was idle, and waits for
+    its result for ever; therefore workers are checked here, too.
     """
 
     def __init__(self, pool: ProcessPoolExecutor) -> None:
@@ -119,8 +119,8 @@ class Workers:
         self._alive: set[BaseProcess] = set()
 
     def submit(self, do: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Hand out work; this is when workers are started: they never hear of Ctrl-C, not even while they import, and
-        none is left half started, which would end in a traceback."""
+        """Submit a job. Workers are started here with signals blocked: they never receive Ctrl-C, not even during
+        imports, and starting one is not interrupted half-way, which would cause a traceback."""
         block = hasattr(signal, "pthread_sigmask")
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}) if block else set()
         try:
@@ -132,10 +132,10 @@ class Workers:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def finished(self, futures: Iterable[Future[Any]]) -> set[Future[Any]]:
-        """Those that are done, once one is.
+        """The finished futures, as soon as there is one.
 
         Raises:
-            BrokenProcessPool: A worker has died.
+            BrokenProcessPool: A worker died.
         """
         while not (done := wait(futures, timeout=_WATCH, return_when=FIRST_COMPLETED).done):
             now = self._now()
@@ -145,12 +145,12 @@ class Workers:
         return done
 
     def result(self, future: Future[Any]) -> Any:
-        """Result of one future; raises as ``finished`` does, and what its work raised."""
+        """Result of one future; raises as ``finished`` does, and the job's own errors."""
         self.finished([future])
         return future.result()
 
     def end(self) -> None:
-        """End workers, those that do not go by force."""
+        """Terminate the workers, and kill those that do not end."""
         self._pool.shutdown(wait=False, cancel_futures=True)
         workers = self._now()
         for worker in workers:
@@ -166,13 +166,13 @@ class Workers:
 
 @contextmanager
 def worker_pool(work: Work[Any], processes: int) -> Iterator[Workers]:
-    """Workers that have begun; left by an exception, they are ended, whatever they are doing.
+    """Context with started workers; they are terminated when it is left by an exception.
 
-    Let ``BrokenProcessPool`` leave it too: the pool waits for its workers for ever where one was started while the
-    pool was ending the others, or does not heed being asked.
+    ``BrokenProcessPool`` must leave the context, too: otherwise the pool may wait for ever for a worker that was
+    started while the pool was terminating the others, or that ignores the termination.
 
     Raises:
-        WarpjldError: They do not start.
+        WarpjldError: Workers do not start.
     """
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=spawn, initializer=_start, initargs=(work,)) as pool:
@@ -192,11 +192,11 @@ _work: Work[Any] | None = None
 
 
 def _start(work: Work[Any]) -> None:
-    """Initialise a worker."""
+    """Initialise a worker process."""
     global _work
     _work = work
     work.begin()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     signal.signal(signal.SIGTERM, _ended)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
@@ -204,7 +204,7 @@ def _start(work: Work[Any]) -> None:
 
 
 def _die_with_parent() -> None:
-    # a pool's worker waits for work on a pipe it holds both ends of: it would outlive a killed parent for ever
+    # a pool's worker waits on a pipe of which it holds both ends: it would outlive a killed parent
     parent = parent_process()
     if parent is not None:
         connection.wait([parent.sentinel])
@@ -217,9 +217,9 @@ _doing = False
 def _ended(*_: object) -> None:
     if not _doing:
         os._exit(1)
-    # what is raised here may come to nothing: in a destructor, or just as a job ends
+    # the exception may be swallowed, in a destructor or at the end of a job: the alarm ends the process then
     signal.alarm(int(_PATIENCE))
-    raise SystemExit(1)  # lets whoever writes a file remove what is half of it
+    raise SystemExit(1)  # lets the writer of a file remove its temporary file
 
 
 def _do(job: Any) -> str:
@@ -229,7 +229,7 @@ def _do(job: Any) -> str:
     try:
         return _work.do(job)
     except SystemExit:
-        os._exit(1)  # a pool would take it for the job's result and go on
+        os._exit(1)  # a pool would return it as the job's result and go on
     finally:
         _doing = False
 
@@ -249,7 +249,7 @@ def _do_block(jobs: list[Any]) -> list[str]:
 def _together(
     work: Work[Job], waiting: deque[list[Job]], processes: int, done: Callable[[Job, str], None]
 ) -> list[Job]:
-    """Work off ``waiting``; if the pool breaks, stop and return the jobs that were handed out."""
+    """Run ``waiting`` blocks in a pool; if it breaks, return the submitted jobs without a result."""
     out: dict[Future[list[str]], list[Job]] = {}
     try:
         with worker_pool(work, min(processes, len(waiting))) as workers:
@@ -268,7 +268,7 @@ def _together(
 
 
 def _settle(work: Work[Job], jobs: Iterable[Job], done: Callable[[Job, str], None]) -> list[Job]:
-    """Jobs that were lost; some may have been kept before the pool noticed that it is broken."""
+    """Jobs without a stored result; others may have finished before the pool noticed that it is broken."""
     lost = []
     for job in jobs:
         status = work.kept(job)

@@ -1,4 +1,4 @@
-"""Warp without its remarks, for programs whose output belongs to what they print."""
+"""Initialisation of Warp without its messages, for command-line programs."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["silence_warp"]
 
 
 def silence_warp() -> None:
-    """Start Warp without its greeting on stdout, which belongs to what the command prints, and without its native
-    library's remark on stderr that there is no GPU: whoever asks for one is told by an error."""
+    """Initialise Warp without its greeting on stdout and its native library's message on stderr about a missing GPU; if
+    a GPU is requested, an error reports that."""
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
@@ -24,7 +24,7 @@ def silence_warp() -> None:
         sys.stderr.flush()
     try:
         kept = os.dup(2)
-    except OSError:  # closed: nothing can be heard there
+    except OSError:  # stderr is closed
         warp.init()
         return
     with open(os.devnull, "w") as nowhere:
@@ -73,6 +73,6 @@ def _move_cache() -> None:
 
     folder = tempfile.mkdtemp(prefix="warpjld-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    os.environ["WARP_CACHE_PATH"] = folder  # for the processes that this one starts
+    os.environ["WARP_CACHE_PATH"] = folder  # for child processes
     warp.config.kernel_cache_dir = folder
     warp.init()

@@ -1,4 +1,4 @@
-"""Work in threads of their own: Warp lets go of the interpreter's lock while a kernel runs on the CPU."""
+"""Multithreaded execution: Warp releases the global interpreter lock while a kernel runs on the CPU."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ __all__ = ["cores", "helpers", "in_threads", "one_blas_thread", "threads_for"]
 
 
 def cores() -> int:
-    """Cores this process may use."""
+    """Number of cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def threads_for(work: int, least: int) -> int:
-    """Threads for a piece of work, each of which has at least ``least`` of it to do."""
+    """Number of threads such that each has at least ``least`` of the work, at most one per core."""
     return min(cores(), max(1, work // least))
 
 
 def in_threads(span: Callable[[int, int], None], count: int, threads: int, kernel: Any, device: Any) -> None:
-    """``span(begin, end)`` over 0 … count, cut into as many pieces as there are threads.
+    """Run ``span(begin, end)`` over 0 … count, divided into one range per thread.
 
     Args:
-        span: Launches the kernel over a range; spans must not write to the same memory.
-        count: Rows in all; with none, nothing is launched.
-        threads: This thread and others.
-        kernel: What is launched.
-        device: Where.
+        span: Launches the kernel over a range; ranges must not write to the same memory.
+        count: Number of rows; if 0, nothing is launched.
+        threads: Number of threads, including the calling one.
+        kernel: The kernel that is launched.
+        device: Its device.
     """
     import warp as wp
 
@@ -41,7 +41,7 @@ def in_threads(span: Callable[[int, int], None], count: int, threads: int, kerne
         return
     cuts = np.linspace(0, count, max(1, min(threads, count)) + 1).astype(int).tolist()
     if len(cuts) > 2:
-        wp.load_module(kernel.module, device=device)  # compiling is not safe from several threads
+        wp.load_module(kernel.module, device=device)  # compilation is not thread-safe
     others = [helpers(threads).submit(span, begin, end) for begin, end in pairwise(cuts[1:])]
     span(cuts[0], cuts[1])
     for other in others:
@@ -50,18 +50,18 @@ def in_threads(span: Callable[[int, int], None], count: int, threads: int, kerne
 
 @cache
 def helpers(threads: int) -> ThreadPoolExecutor:
-    """One thread fewer than that many, kept for the next call: starting threads can cost as much as their work."""
+    """A pool of ``threads`` - 1 threads, reused by later calls: starting threads can cost as much as their work."""
     return ThreadPoolExecutor(threads - 1, thread_name_prefix="warpjld")
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Linear algebra on this thread alone meanwhile, in the whole process; also a decorator.
+    """Restrict BLAS to one thread, in the whole process; context manager and decorator.
 
-    A sparse factorisation calls BLAS for thousands of small dense blocks. Threads that wait for their share of each
-    spin: on two cores the factorisations of a body of 14,000 vertices take 4 s of the processor instead of 1.4, and
-    where other programs want the cores too, 8. Contact solves have vectors and small blocks only: a Krylov step takes
-    2.4 ms on one thread, and 340 with busy cores on two; and sums come out in the same order everywhere.
+    A sparse factorisation calls BLAS for thousands of small dense blocks, in which waiting threads spin: on two cores
+    the factorisations of a body of 14,000 vertices take 4 s of processor time instead of 1.4 s, or 8 s if other
+    programs use the cores. Contact solves have vectors and small blocks only: a Krylov step takes 2.4 ms on one thread,
+    and 340 ms on two busy cores. One thread also makes the order of summation reproducible.
     """
     with _blas().limit(limits=1, user_api="blas"):
         yield
@@ -69,7 +69,7 @@ def one_blas_thread() -> Iterator[None]:
 
 @cache
 def _blas() -> Any:
-    # NumPy and SciPy each bring a BLAS of their own: both have to be loaded before they can be found
+    # NumPy and SciPy each have their own BLAS: both must be loaded before threadpoolctl can find them
     import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 

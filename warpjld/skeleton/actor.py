@@ -1,4 +1,4 @@
-"""The 87-point actor skeleton of a body (B §2.1, R12): its joints, and what the surface tells of the rest."""
+"""The 87-point actor skeleton of a body (B §2.1, R12), from its joints and, for points without a joint, its surface."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def actor_skeleton(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDA
     if up is not None and forward is not None:
         points |= dict(_face(joints, vertices, up, forward))
         points |= dict(_heels(joints, vertices, faces, forward))
-    # what the skeleton holds as a joint of its own is where it stands
+    # a joint of the skeleton with a point's own name overrides the position derived from others
     points |= {name: joints[own] for name, own in CANONICAL.items() if own in joints and own not in _NUMBERED}
     if all(own in joints for own in _NUMBERED):
         points |= {name: joints[own] for name, own in CANONICAL.items() if own in _NUMBERED}
@@ -64,22 +64,22 @@ def actor_skeleton(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDA
 
 
 def hand_points(skeleton: Skeleton) -> ActorSkeleton:
-    """The 25 points of each hand that a skeleton without a body holds.
+    """The 25 points of each hand of a skeleton that has no body.
 
     Raises:
-        InputError: It has no hand.
+        InputError: The skeleton has no hand.
     """
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     sides = [side for side in ("left", "right") if f"{side}.index.base" in joints]
     if not sides:
-        raise InputError("named points are a body's or a hand's: this skeleton is neither")
+        raise InputError("named points need a body or a hand: this skeleton has neither")
     wanted = [name for side in sides for name in hand_joint_names(side)]
     return ActorSkeleton(
         {name: joints[name] for name in wanted if name in joints}, tuple(n for n in wanted if n not in joints)
     )
 
 
-_BEHIND = 0.06  # of the height from skull base to crown: nose and chin lie that far inside, about 1 cm
+_SKIN_DEPTH = 0.06  # depth of nose and chin inside the skin, per height from skull base to crown; about 1 cm
 _NUMBERED = tuple(own for name, own in CANONICAL.items() if name.startswith("vertebra"))
 
 Joints = dict[str, NDArray[np.float64]]
@@ -125,7 +125,7 @@ def _legs(joints: Joints) -> Placed:
 
 
 def body_facing(joints: Joints) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
-    """Up and forward of a body, unit vectors; None where its hips and head do not tell."""
+    """Up and forward directions of a body, unit vectors; None where head or hip joints are missing."""
     if not {"head", "left.hip", "right.hip"} <= set(joints):
         return None, None
     up = unit(joints["head"] - joints["pelvis"])
@@ -135,9 +135,9 @@ def body_facing(joints: Joints) -> tuple[NDArray[np.float64] | None, NDArray[np.
 def _face(
     joints: Joints, vertices: NDArray[np.float64], up: NDArray[np.float64], forward: NDArray[np.float64]
 ) -> Placed:
-    """Nose and chin inside the flesh, a little behind their foremost points."""
+    """Nose and chin inside the flesh, slightly behind their foremost surface points."""
     for name, point in face_points(joints, vertices, up, forward):
-        yield name, point - _BEHIND * float((joints["head.top"] - joints["head"]) @ up) * forward
+        yield name, point - _SKIN_DEPTH * float((joints["head.top"] - joints["head"]) @ up) * forward
 
 
 def face_points(
@@ -156,7 +156,7 @@ def face_points(
         return
     nose = face[ahead[face].argmax()]
     yield "nose_tip", vertices[nose]
-    # below the nose by a quarter of the way from there to the crown come the lips, by two fifths the chin
+    # along the height from nose to crown, the lips lie a quarter below the nose, the chin two fifths
     crown = float(high[midline].max() - high[nose])
     lower = np.flatnonzero(midline & (high < high[nose] - 0.36 * crown) & (high > high[nose] - 0.55 * crown))
     if len(lower):

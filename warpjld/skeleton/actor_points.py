@@ -1,7 +1,7 @@
-"""Names of the 87-point actor skeleton (B §2.1, R12), who hangs on whom, and which canonical joint each point is.
+"""Names of the 87-point actor skeleton (B §2.1, R12), the parent of each point, and its canonical joint.
 
-The papers publish its count, not its points: two hands of 25 points (wrists included), 11 points of trunk and head,
-per arm 4, per leg 9: 50 + 11 + 8 + 18 = 87.
+The papers give the number of points, not the points. Here: two hands of 25 points (wrists included), 11 points of trunk
+and head, 4 per arm, 9 per leg: 50 + 11 + 8 + 18 = 87.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from collections.abc import Collection
 
 from warpjld.skeleton.hand import HAND_PARENTS, hand_joint_names
 
-__all__ = ["ACTOR_PARENTS", "ACTOR_POINTS", "CANONICAL", "CARRIES_NOTHING", "POINT_JOINTS", "point_set"]
+__all__ = ["ACTOR_PARENTS", "ACTOR_POINTS", "CANONICAL", "NO_ARTICULATION", "POINT_JOINTS", "point_set"]
 
 _SIDES = ("left", "right")
 
 _TRUNK = {
-    "pelvis": "where spine and legs part",
+    "pelvis": "where spine and legs meet",
     "vertebra1": "lowest of five joints of the spine",
     "vertebra2": "second",
     "vertebra3": "third",
@@ -91,9 +91,9 @@ def _parent(side: str, name: str) -> str:
 ACTOR_PARENTS: dict[str, str | None] = {
     name: _TRUNK_PARENTS[name] if name in _TRUNK_PARENTS else _parent(*name.split(".", 1)) for name in ACTOR_POINTS
 }
-"""The point that each one hangs on."""
+"""Point → parent point; None for the root."""
 
-_OTHERWISE = {
+_CANONICAL_NAMES = {
     "vertebra1": "spine1",
     "vertebra2": "spine2",
     "vertebra3": "spine3",
@@ -110,24 +110,24 @@ _OTHERWISE = {
 
 def _canonical(name: str) -> str:
     side, dot, short = name.partition(".")
-    return f"{side}.{_OTHERWISE.get(short, short)}" if dot else _OTHERWISE.get(name, name)
+    return f"{side}.{_CANONICAL_NAMES.get(short, short)}" if dot else _CANONICAL_NAMES.get(name, name)
 
 
 CANONICAL: dict[str, str] = {name: _canonical(name) for name in ACTOR_POINTS}
-"""Point → canonical joint; those that bend nothing (chin, heel, …) are joints of their own name."""
+"""Point → canonical joint; points without a joint that bends (chin, heel, …) are joints of the same name."""
 
 _LEAVES = ("chin", "nose_tip", "sternum", "pelvic_hip", "heel")
 POINT_JOINTS: tuple[str, ...] = tuple(
     dict.fromkeys(CANONICAL[name] for name in ACTOR_POINTS if name.rpartition(".")[2] in (*_LEAVES, "forearm_twist"))
 )
-"""Canonical joints that only an actor's points are: no convention of joint names has them."""
+"""Canonical joints that exist only in an actor skeleton; no joint naming convention has them."""
 
-CARRIES_NOTHING: tuple[str, ...] = _LEAVES
-"""Points, without their side, at which nothing bends."""
+NO_ARTICULATION: tuple[str, ...] = _LEAVES
+"""Points, without their side, that are no articulation."""
 
 
 def point_set(names: Collection[str]) -> tuple[str, ...]:
-    """The set that a collection of names is meant to be: the 25 of one hand where all are that hand's, else all 87."""
+    """The point set that names belong to: the 25 of one hand if all of them are that hand's, else all 87."""
     for side in _SIDES:
         hand = hand_joint_names(side)
         if names and set(names) <= set(hand):

@@ -1,4 +1,4 @@
-"""The arm as a chain of joints: where its angles bring the hand."""
+"""The arm as a kinematic chain: forward kinematics from girdle to wrist, batched over sets of angles."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from warpjld.skeleton.tree import CHANNELS, Skeleton
 __all__ = ["Arm", "arm_of"]
 
 _CLAVICLE = np.radians(20.0)
-"""How far the shoulder girdle goes along with an arm that reaches, each way (elevation and protraction, of the 30 to
-40° that it has: Ludewig et al., J Bone Joint Surg Am 91, 2009)."""
+"""Largest rotation of the shoulder girdle in reaching, each way (elevation and protraction, of a range of 30 to 40°:
+Ludewig et al., J Bone Joint Surg Am 91, 2009)."""
 _MOVING = {"clavicle": ("flexion", "abduction"), "shoulder": ("flexion", "twisting", "abduction")}
 _MOVING |= {"elbow": ("flexion", "twisting"), "wrist": ("flexion", "abduction")}
 
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """An arm from its girdle to its wrist, on a body that stands still.
+    """A kinematic chain from shoulder girdle to wrist, on a body that does not move.
 
     Attributes:
-        skeleton: The body's.
-        joints: Numbers along the chain, the first below ``base``, the last the wrist.
-        base: Joint that carries the chain.
-        shoulder, elbow, wrist: Places of these in ``joints``.
-        free: Rows (place in ``joints``, channel) of the angles that move the arm, shape (n, 2).
-        limits: Their smallest and largest values [rad], shape (n, 2).
+        skeleton: The body's skeleton.
+        joints: Joint indices along the chain, the first a child of ``base``, the last the wrist.
+        base: Parent joint of the chain.
+        shoulder, elbow, wrist: Positions of these joints in ``joints``.
+        free: Degrees of freedom: rows (position in ``joints``, channel), shape (n, 2).
+        limits: Smallest and largest value of each degree of freedom [rad], shape (n, 2).
     """
 
     skeleton: Skeleton
@@ -46,17 +46,17 @@ class Arm:
 
     @cached_property
     def length(self) -> float:
-        """From the shoulder over the elbow to the wrist [m]."""
+        """Length from shoulder over elbow to wrist [m]."""
         rest = self.skeleton.rest[list(self.joints)]
         return float(np.linalg.norm(np.diff(rest[self.shoulder :], axis=0), axis=1).sum())
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The arm's own angles [rad], shape (n,), of those of the skeleton (J, 4)."""
+        """Values of the degrees of freedom [rad], shape (n,), in the skeleton's angles (J, 4)."""
         joints = np.asarray(self.joints)[self.free[:, 0]]
         return np.asarray(angles[joints, self.free[:, 1]])
 
     def posed(self, angles: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angles of the skeleton (J, 4) with those of the arm (n,) put in."""
+        """A copy of the skeleton's angles (J, 4) with the degrees of freedom set to ``values`` (n,)."""
         out = angles.copy()
         out[np.asarray(self.joints)[self.free[:, 0]], self.free[:, 1]] = values
         return out
@@ -64,12 +64,12 @@ class Arm:
     def chains(
         self, angles: NDArray[np.float64], values: NDArray[np.float64], body: Poses
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Joints of the arm for B sets of its angles.
+        """Joint positions and rotations of the chain for B sets of values.
 
         Args:
-            angles: Of the skeleton, for those of the chain that do not move [rad], shape (J, 4).
-            values: Of the arm [rad], shape (B, n).
-            body: One pose that says where the body is.
+            angles: The skeleton's angles, used for joints of the chain that are not free [rad], shape (J, 4).
+            values: Degrees of freedom [rad], shape (B, n).
+            body: A single pose that places ``base``.
 
         Returns:
             Positions [m], shape (B, K, 3), and rotations from rest, quaternions x, y, z, w, shape (B, K, 4).
@@ -90,18 +90,20 @@ class Arm:
         return positions, rotations
 
     def carried(self, point: NDArray[np.float64], body: Poses) -> NDArray[np.float64]:
-        """A point of the posed hand [m] as an offset from the wrist in its bone's rest axes, shape (3,): it goes where
-        the wrist goes while the hand's own angles stay."""
+        """A point of the posed hand [m] in the rest axes of the wrist's bone, relative to the wrist, shape (3,).
+
+        It is constant while the angles of the hand itself do not change.
+        """
         wrist = self.joints[-1]
         local = rotate(conjugate(body.rotations[0, wrist]), point - body.positions[0, wrist])
         return np.asarray(local)
 
 
 def arm_of(skeleton: Skeleton, side: str) -> Arm:
-    """The arm of a side: clavicle where there is one, shoulder, elbow, wrist, and whatever lies between them.
+    """The chain of one arm: clavicle (if there is one), shoulder, elbow, wrist, and all joints between them.
 
     Raises:
-        InputError: There is no shoulder, elbow or wrist.
+        InputError: Shoulder, elbow or wrist is missing, or the wrist is no descendant of the shoulder.
     """
     places = {name: k for k, name in enumerate(skeleton.names)}
     missing = [name for name in ("shoulder", "elbow", "wrist") if f"{side}.{name}" not in places]
@@ -116,7 +118,9 @@ def arm_of(skeleton: Skeleton, side: str) -> Arm:
             break
         joint = int(skeleton.parents[joint])
     if joint < 0 or skeleton.parents[top] < 0:
-        raise InputError(f"no {side} arm: its wrist does not hang on its shoulder, or the shoulder on nothing")
+        raise InputError(
+            f"no {side} arm: its wrist must be a descendant of its shoulder, and the shoulder must have a parent"
+        )
     rows, limits = [], []
     for k, number in enumerate(chain):
         for channel in _MOVING.get(skeleton.names[number].rpartition(".")[2], ()):

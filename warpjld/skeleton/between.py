@@ -1,4 +1,4 @@
-"""Poses between recorded ones."""
+"""Interpolation of poses at fractional frames."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["poses_between"]
 
 
 def poses_between(poses: Poses, at: NDArray[np.float64]) -> Poses:
-    """Poses between recorded ones, at rows (F,) whole or not; before the first and after the last they hold."""
+    """Poses interpolated at fractional rows (F,); constant before the first and after the last row."""
     at = np.clip(at, 0, len(poses) - 1)
     before = np.floor(at).astype(int)
     after = np.minimum(before + 1, len(poses) - 1)
@@ -20,7 +20,7 @@ def poses_between(poses: Poses, at: NDArray[np.float64]) -> Poses:
     if not part.any():
         return Poses(poses.positions[before], poses.rotations[before], poses.flexion[before])
     first, second = poses.rotations[before], poses.rotations[after]
-    # one sign for the whole frame: signs are aligned along the tree, and stay so
+    # one sign flip per frame: signs are aligned along the joint tree and must stay so
     flip = np.where((first * second).sum((1, 2)) < 0, -1.0, 1.0)[:, None, None]
     rotations = unit((1 - part) * first + part * flip * second)
     positions = (1 - part) * poses.positions[before] + part * poses.positions[after]

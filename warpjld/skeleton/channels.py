@@ -1,4 +1,4 @@
-"""Angles of a joint, and the rotation that they make of its bone."""
+"""Angle channels of a joint, and the rotation of its bone that they define."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CHANNELS = ("flexion", "pivot", "twisting", "abduction")
 pivot turns the flexion axis about the segment (R27) and so moves nothing while the joint is straight."""
 
 FLEXION = CHANNELS.index("flexion")
-"""Where on that axis the angle is that closes hands."""
+"""Index of the flexion channel."""
 
 
 def channel_rotations(
@@ -23,7 +23,7 @@ def channel_rotations(
     directions: NDArray[np.float64],
     mirror: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Rotations of K bones by their joints' angles, in the axes that these directions are in, shape (…, K, 4).
+    """Rotations of K bones from their joints' angles, quaternions x, y, z, w in the axes of ``directions``, (…, K, 4).
 
     Args:
         angles: [rad], shape (…, K, 4), channels as in ``CHANNELS``.

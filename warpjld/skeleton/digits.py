@@ -1,4 +1,4 @@
-"""The digits of a skeleton, and the joints that bend them."""
+"""The digits of a skeleton and their flexion joints."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ __all__ = ["digit_joints"]
 
 
 def digit_joints(skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
-    """Flexion joints of every digit there is, base first, by its name (``index``, ``left.index``); sides one after
-    another, digits from pinky to thumb. Those of a hand drawn with less than three phalanges have fewer."""
+    """Flexion joints of every digit, base first, by the digit's name (``index``, ``left.index``).
+
+    Ordered by side, then from pinky to thumb. Digits with fewer than three phalanges have fewer joints.
+    """
     found = {}
     for side in ("left.", "right.", ""):
         for digit in DIGITS:

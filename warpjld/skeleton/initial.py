@@ -1,8 +1,8 @@
-"""Initial angles: how far the joints of the digitised pose are bent (A §3, R25).
+"""Initial angles: joint angles of the rest pose (A §3, R25).
 
-Limits and flexion ratios are those of joints that count from straight. Where the elbow or the knee of a rest pose is
-bent (an A-pose's elbows mostly are), the angle between upper and lower limb says by how much; of other joints segments
-say little: at rest a hip or the base of a finger is no straight line, and knuckles are placed to a few degrees.
+Limits and flexion ratios count from the straight joint. For elbows and knees that are bent in the rest pose (elbows in
+most A-poses), the initial flexion is the angle between upper and lower limb. Other joints are not estimated: at rest a
+hip or the base of a finger is not straight, and knuckle positions are exact to a few degrees only.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["bent_as_before", "bent_limbs", "check_initial", "with_initial"]
 
 _HINGES = {"elbow": ("shoulder", "wrist"), "knee": ("hip", "ankle")}
-_PLAIN = np.radians(1.0)
-"""Bends below are how exactly joints are placed."""
-_SLACK = 1e-6  # rad: limits in files are in degrees
+_NEGLIGIBLE = np.radians(1.0)
+"""Smaller angles are within the accuracy of joint positions and count as straight."""
+_ROUNDING = 1e-6  # rad: limits in files are in degrees
 
 
 def with_initial(skeleton: Skeleton, given: Mapping[int, Mapping[str, float]]) -> tuple[Skeleton, tuple[str, ...]]:
-    """A skeleton with the angles of its rest pose, and what is to be said of them. Elbows and knees of which nothing is
-    stated take theirs from where the joints are.
+    """A skeleton with initial angles set, and notes for the user. Elbows and knees without a stated angle get the one
+    that their joint positions give.
 
     Args:
         skeleton: With limits.
-        given: Angles [rad] that are stated, by joint then channel.
+        given: Stated angles [rad], by joint, then by channel name.
 
     Raises:
         InputError: A stated angle is beyond its joint's limits.
@@ -55,8 +55,8 @@ def with_initial(skeleton: Skeleton, given: Mapping[int, Mapping[str, float]]) -
 
 
 def bent_limbs(skeleton: Skeleton) -> dict[int, float]:
-    """Flexion [rad] of the elbows and knees that are bent at rest: the angle between upper and lower limb about the
-    flexion axis."""
+    """Flexion [rad] of elbows and knees that are bent at rest, by joint: the angle between upper and lower limb about
+    the flexion axis."""
     places = {name: joint for joint, name in enumerate(skeleton.names)}
     out = {}
     for name, joint in places.items():
@@ -68,14 +68,14 @@ def bent_limbs(skeleton: Skeleton) -> dict[int, float]:
         axis = skeleton.axes[joint]
         before, after = (unit(v - axis * (axis @ v)) for v in (before, after))
         angle = float(np.arctan2(np.cross(before, after) @ axis, before @ after))
-        if angle > _PLAIN:
+        if angle > _NEGLIGIBLE:
             out[joint] = angle
     return out
 
 
 def bent_as_before(before: Skeleton, after: Skeleton) -> Skeleton:
-    """A skeleton whose joints or axes were moved, with the initial angles that follow from where joints are taken anew;
-    those that were stated stay."""
+    """``after``, a skeleton whose joints or axes were moved, with updated initial angles: those that followed from the
+    joint positions in ``before`` are computed anew, stated ones are kept."""
     old, new = bent_limbs(before), bent_limbs(after)
     initial, limits = after.initial.copy(), after.limits.copy()
     for joint, angle in old.items():
@@ -99,4 +99,4 @@ def check_initial(skeleton: Skeleton) -> None:
 
 
 def _within(angle: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.asarray((angle >= low - _SLACK) & (angle <= high + _SLACK))
+    return np.asarray((angle >= low - _ROUNDING) & (angle <= high + _ROUNDING))

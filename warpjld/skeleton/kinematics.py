@@ -26,12 +26,12 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Final positions of a skeleton over F frames: what the covering needs and nothing else.
+    """Posed skeletons over F frames: all that the covering needs.
 
     Attributes:
         positions: Joint positions [m], shape (F, J, 3).
         rotations: Rotation of each joint's bone from the rest pose, unit quaternions x, y, z, w, shape (F, J, 4).
-            Signs are aligned along the tree, so that any two neighbours blend the short way.
+            Signs are aligned along the tree, so that blending two neighbours takes the shorter arc.
         flexion: Vertical component of each joint's flexion [rad], shape (F, J) (R28, R29).
 
     Examples:
@@ -109,7 +109,7 @@ def joint_rotations(
     Args:
         skeleton: The rest skeleton.
         angles: Joint angles [rad], shape (F, K, 4), channels as in ``CHANNELS``.
-        joints: Whose they are, shape (K,); of all where it is left out.
+        joints: Joint indices that ``angles`` belongs to, shape (K,); all joints by default.
     """
     chosen = slice(None) if joints is None else joints
     axes, directions, mirror = skeleton.axes[chosen], skeleton.directions[chosen], skeleton.mirror[chosen, None]
@@ -142,7 +142,7 @@ def poses_from_rotations(
 
 
 def poses_from_world(skeleton: Skeleton, positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> Poses:
-    """Poses of joints that a motion file places itself, so that bones may change their length.
+    """Poses of joints whose world transforms are given, so that bones may change their length.
 
     Args:
         skeleton: The rest skeleton.
@@ -220,7 +220,7 @@ def vertical_flexion(skeleton: Skeleton, local: NDArray[np.float64]) -> NDArray[
 
 
 def _levels(parents: NDArray[np.int32]) -> list[tuple[NDArray[np.int64], NDArray[np.int32]]]:
-    """Joints with their parents, those first that are nearer to a root: one level may be computed at once."""
+    """Joints and their parents, grouped by depth in the tree (roots first): each level is computed at once."""
     depth = np.zeros(len(parents), dtype=np.int64)
     for j, parent in enumerate(parents.tolist()):
         depth[j] = depth[parent] + 1 if parent >= 0 else 0

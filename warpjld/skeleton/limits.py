@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.skeleton.actor_points import CARRIES_NOTHING
+from warpjld.skeleton.actor_points import NO_ARTICULATION
 
 __all__ = ["default_limits"]
 
-# role: (flexion, pivot, twisting, abduction), each (smallest, largest) in degrees; unnamed channels are closed
+# role: (flexion, pivot, twisting, abduction), each (smallest, largest) in degrees
 _CLOSED = (0.0, 0.0)
 _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "wrist": ((-70, 80), (-30, 20), _CLOSED, (-30, 20)),
@@ -22,10 +22,10 @@ _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "thumb.base": ((-20, 15), (-45, 45), _CLOSED, (-45, 45)),
     "thumb.knuckle2": ((0, 55), _CLOSED, _CLOSED, _CLOSED),
     "thumb.knuckle3": ((0, 80), _CLOSED, _CLOSED, _CLOSED),
-    "tip": (_CLOSED,) * 4,  # an extremity carries nothing
+    "tip": (_CLOSED,) * 4,  # an extremity has no bone
     "index.carpometacarpal": (_CLOSED,) * 4,
     "middle.carpometacarpal": (_CLOSED,) * 4,
-    **dict.fromkeys(CARRIES_NOTHING, (_CLOSED,) * 4),
+    **dict.fromkeys(NO_ARTICULATION, (_CLOSED,) * 4),
     "forearm_twist": (_CLOSED, _CLOSED, (-80, 80), _CLOSED),
     "elbow": ((0, 150), _CLOSED, (-80, 80), _CLOSED),
     "shoulder": ((-60, 180), (0, 180), (-90, 70), (-60, 180)),
@@ -33,12 +33,12 @@ _ROLES: dict[str, tuple[tuple[float, float], ...]] = {
     "knee": ((0, 135), _CLOSED, _CLOSED, _CLOSED),
     "ankle": ((-20, 50), _CLOSED, (-35, 35), _CLOSED),
 }
-# degrees, of joints that no table names: wide, since nothing is known of them
+# degrees, for joints with names of no known role
 _OTHER = ((-120.0, 120.0), (-90.0, 90.0), (-120.0, 120.0), (-90.0, 90.0))
 
 
 def default_limits(names: Sequence[str]) -> NDArray[np.float64]:
-    """Limits [rad] of joints with these canonical names, shape (J, 4, 2); wide ones where the name says nothing."""
+    """Limits [rad] of joints with these canonical names, shape (J, 4, 2); wide ones for names of no known role."""
     rows = []
     for name in names:
         parts = name.split(".")

@@ -1,11 +1,11 @@
-"""Angles of an arm with which a point of its hand comes to a place: inverse kinematics inside the joints' limits.
+"""Inverse kinematics of an arm: joint angles within limits that bring a point of the hand to a target.
 
-Seven to nine angles serve three to five wishes, so most targets are reached by many postures. Of those the most
-comfortable is taken: the least sum of squares of how far the wrist is bent, the forearm and the upper arm are turned,
-the shoulder girdle is drawn along, the upper arm is lifted from where it hangs and swung from where it is (after the
-discomfort of Cruse, Biol. Cybern. 54, 1986), and of how deep the arm would lie in the body. It is solved by a
-trust-region method with bounds (SciPy's ``least_squares``), from the best of postures spread over the whole range of
-the arm, so that neither the pose before nor a singular straight arm decides.
+Seven to nine angles meet three to five constraints, so most targets are reached by many postures. The most comfortable
+one is taken: the least sum of squares of wrist bending, forearm and upper arm twist, girdle motion, deviation of the
+upper arm from hanging and its swing from the present pose (after the discomfort of Cruse, Biol. Cybern. 54, 1986), and
+of penetration of the body. It is solved by a trust-region method with bounds (SciPy's ``least_squares``), started from
+the best of samples of the arm's whole range, so that the result depends neither on a local minimum near the present
+pose nor on a singular straight arm.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from warpjld.skeleton.tree import CHANNELS
 __all__ = ["Reached", "Target", "clear", "reach"]
 
 Depths = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
-"""How deep samples along an arm lie in the body, none below 0: joints (B, K, 3) [m] and rotations (B, K, 4) → depths
-(B, samples) [m]."""
+"""Penetration depths of samples along an arm in the body, at least 0: joints (B, K, 3) [m] and rotations (B, K, 4) →
+depths (B, samples) [m]."""
 
-_SPREAD = 512
-"""Postures the search may begin with."""
+_SAMPLES = 512
+"""Postures sampled as candidates for starts."""
 _STARTS = 5
-"""Of them those it does begin with."""
-_STEP = 1e-6  # of differences [rad]
-_NEAR = (20.0, 1000.0)
-"""Weight of the distance over the arm's length, first and at last: what is comfortable is settled, then the target is
-met: comfort moves it by less than 1e-5 of the arm's length."""
-_LOOK = 2.0
-"""Weight of directions that are wished for, such as where the palm looks, over the sine of the angle that they are off;
-those that a grasp prescribes weigh as places do."""
-_EXACT = 5.0  # of directions that are prescribed, at first; at last as much more as of places
-_DEEP = 50.0  # weight of depths in the body, over the arm's length
-# weights of discomfort, over half of the range that clinical tables give
+"""Best samples from which the search is started."""
+_STEP = 1e-6  # of central differences [rad]
+_DISTANCE_WEIGHTS = (20.0, 1000.0)
+"""Weights of the distance to the target over the arm's length, of the first and the last solve: the first settles the
+comfort terms, the last meets the target; comfort moves it by less than 1e-5 of the arm's length."""
+_PREFERRED = 2.0
+"""Weight of preferred directions (such as that of the palm), over the sine of their deviation; prescribed ones weigh as
+positions do."""
+_PRESCRIBED = 5.0  # weight of prescribed directions in the first solve; scaled as that of the distance in the last
+_PENETRATION = 50.0  # weight of penetration depths, over the arm's length
+# weights of discomfort, over half of the clinical range of motion
 _DISCOMFORT = {
     ("wrist", "flexion"): 0.5 / np.radians(75.0),
     ("wrist", "abduction"): 0.5 / np.radians(25.0),
@@ -51,22 +51,22 @@ _DISCOMFORT = {
     ("clavicle", "abduction"): 0.8 / np.radians(20.0),
 }
 _SWING = 0.2 / np.radians(90.0)
-"""Weight of how far the shoulder swings from where it is: of two ways to turn it the shorter one is animated."""
+"""Weight of the shoulder's swing from the present pose: of two ways to turn it the shorter one is taken."""
 _SWINGING = (("shoulder", "flexion"), ("shoulder", "abduction"))
-_HANG = 0.4
-_OUT = np.radians(15.0)  # between a hanging upper arm and the trunk's plumb line
+_HANGING = 0.4  # weight of the upper arm's deviation from hanging
+_HANGING_ANGLE = np.radians(15.0)  # between a hanging upper arm and the vertical of the trunk
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """What a hand is to come to.
+    """Target of a hand.
 
     Attributes:
-        place: Where the point is to be [m], shape (3,).
+        place: Target position of the point [m], shape (3,).
         point: The point, as an offset from the wrist in the wrist's rest axes [m], shape (3,).
-        aims: Pairs of a unit direction of the hand at rest and of what it is to be turned to, shapes (3,): none, one
-            (the palm looks somewhere), or two (the hand's whole rotation).
-        exact: Whether aims are as binding as the place, or give way to what is comfortable.
+        aims: Pairs of a unit direction of the hand at rest and its target direction, shapes (3,): none, one (of the
+            palm), or two (the hand's whole rotation).
+        exact: Whether aims are as binding as the position, or yield to comfort.
     """
 
     place: NDArray[np.float64]
@@ -77,12 +77,12 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """How far an arm came.
+    """Posture found by :func:`reach` and its errors.
 
     Attributes:
-        angles: Of the skeleton [rad], shape (J, 4): of the arm those that were found, of all others those given.
-        short: Distance that is left [m].
-        off: Largest angle between an aim and where it was to be turned [rad], 0 where there is none.
+        angles: The skeleton's angles [rad], shape (J, 4): those of the arm replaced by the ones found.
+        short: Remaining distance to the target [m].
+        off: Largest angle between an aim and its target direction [rad], 0 without aims.
     """
 
     angles: NDArray[np.float64]
@@ -93,29 +93,29 @@ class Reached:
 def reach(
     arm: Arm, angles: NDArray[np.float64], body: Poses, target: Target, *, depths: Depths | None = None
 ) -> Reached:
-    """The most comfortable posture of an arm with which it comes nearest to a target.
+    """The most comfortable posture of an arm that comes nearest to a target.
 
     Args:
         arm: The arm.
-        angles: Of the skeleton, whose other joints stay [rad], shape (J, 4).
-        body: The pose of these angles on the stage, one frame.
-        target: In the stage's frame.
-        depths: How deep samples of the arm lie in what they are not to enter.
+        angles: The skeleton's angles; those of other joints are kept [rad], shape (J, 4).
+        body: Pose of these angles in the scene, one frame.
+        target: Target in the scene's frame.
+        depths: Penetration depths of samples of the arm in what it must not enter.
     """
     from scipy.optimize import least_squares
 
-    costs = _Costs(arm, angles, body, target, depths)
+    costs = _Residuals(arm, angles, body, target, depths)
     low, high = arm.limits.T
     best: NDArray[np.float64] | None = None
     least = np.inf
     for start in costs.starts():
-        # strictly inside: the method asks for that
+        # strictly inside the bounds, as least_squares requires
         found = np.clip(start, low + 1e-9, high - 1e-9)
-        for near in _NEAR:
+        for near in _DISTANCE_WEIGHTS:
             solved = least_squares(
                 lambda x, near=near: costs(x[None], near)[0],
                 found,
-                jac=lambda x, near=near: _slopes(lambda some: costs(some, near), x),
+                jac=lambda x, near=near: _jacobian(lambda postures: costs(postures, near), x),
                 bounds=(low, high),
                 xtol=1e-10,
                 ftol=1e-10,
@@ -132,32 +132,32 @@ def reach(
 def clear(
     arm: Arm, angles: NDArray[np.float64], body: Poses, values: NDArray[np.float64], depths: Depths
 ) -> NDArray[np.float64]:
-    """Angles of the arm (n,) [rad] nearest to the given ones with which it lies clear of the body.
+    """Angles of the arm (n,) [rad] nearest to the given ones at which it does not penetrate the body.
 
     Args:
         arm: The arm.
-        angles: Of the skeleton, whose other joints stay [rad], shape (J, 4).
-        body: One pose that says where the body is.
-        values: Those to begin with [rad], shape (n,).
-        depths: How deep samples of the arm lie in what they are not to enter.
+        angles: The skeleton's angles; those of other joints are kept [rad], shape (J, 4).
+        body: A single pose that places the body.
+        values: Angles of the arm to start from [rad], shape (n,).
+        depths: Penetration depths of samples of the arm in what it must not enter.
     """
     from scipy.optimize import least_squares
 
     low, high = arm.limits.T
 
-    def costs(some: NDArray[np.float64]) -> NDArray[np.float64]:
-        positions, rotations = arm.chains(angles, some, body)
-        return np.concatenate([some - values, _DEEP * depths(positions, rotations) / arm.length], axis=1)
+    def costs(postures: NDArray[np.float64]) -> NDArray[np.float64]:
+        positions, rotations = arm.chains(angles, postures, body)
+        return np.concatenate([postures - values, _PENETRATION * depths(positions, rotations) / arm.length], axis=1)
 
     start = np.clip(values, low + 1e-9, high - 1e-9)
     solved = least_squares(
-        lambda x: costs(x[None])[0], start, jac=lambda x: _slopes(costs, x), bounds=(low, high), max_nfev=100
+        lambda x: costs(x[None])[0], start, jac=lambda x: _jacobian(costs, x), bounds=(low, high), max_nfev=100
     )
     return np.asarray(solved.x)
 
 
-class _Costs:
-    """Residuals of postures; args as of ``reach``."""
+class _Residuals:
+    """Residuals of postures; arguments as of ``reach``."""
 
     def __init__(
         self, arm: Arm, angles: NDArray[np.float64], body: Poses, target: Target, depths: Depths | None
@@ -176,25 +176,25 @@ class _Costs:
         positions, rotations = arm.chains(self._angles, values, self._body)
         away = positions[:, -1] + rotate(rotations[:, -1], target.point) - target.place
         upper = unit(positions[:, arm.elbow] - positions[:, arm.shoulder])
-        out = [near * away / arm.length, _HANG * (upper - self._hang), self._weights * values]
+        out = [near * away / arm.length, _HANGING * (upper - self._hang), self._weights * values]
         out.append(self._swing * (values - self._now))
-        weight = near / _NEAR[0] * _EXACT if target.exact else _LOOK
+        weight = near / _DISTANCE_WEIGHTS[0] * _PRESCRIBED if target.exact else _PREFERRED
         out += [weight * (rotate(rotations[:, -1], own) - wanted) for own, wanted in target.aims]
         if self._depths is not None:
-            out.append(_DEEP * self._depths(positions, rotations) / arm.length)
+            out.append(_PENETRATION * self._depths(positions, rotations) / arm.length)
         return np.concatenate(out, axis=1)
 
     def starts(self) -> NDArray[np.float64]:
-        """The best of postures spread evenly over the arm's range, shape (S, n)."""
+        """The best of a low-discrepancy sample of the arm's range, shape (S, n)."""
         from scipy.stats import qmc
 
         low, high = self._arm.limits.T
-        spread = low + qmc.Sobol(len(low), scramble=False).random(_SPREAD) * (high - low)
-        order = np.argsort((self(spread, _NEAR[0]) ** 2).sum(axis=1), kind="stable")
+        spread = low + qmc.Sobol(len(low), scramble=False).random(_SAMPLES) * (high - low)
+        order = np.argsort((self(spread, _DISTANCE_WEIGHTS[0]) ** 2).sum(axis=1), kind="stable")
         return np.asarray(spread[order[:_STARTS]])
 
     def reached(self, x: NDArray[np.float64]) -> Reached:
-        """What a posture comes to."""
+        """Result of a posture (n,), with its errors."""
         target = self._target
         positions, rotations = self._arm.chains(self._angles, x[None], self._body)
         away = positions[0, -1] + rotate(rotations[0, -1], target.point) - target.place
@@ -203,27 +203,27 @@ class _Costs:
         return Reached(self._arm.posed(self._angles, x), float(np.linalg.norm(away)), off)
 
 
-def _slopes(
+def _jacobian(
     residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]], x: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Derivatives (R, n) of residuals, of B postures (B, n) → (B, R), by central differences, all in one batch."""
+    """Jacobian (R, n) of residuals (B, n) → (B, R), by central differences evaluated in one batch."""
     shifts = _STEP * np.eye(len(x))
     both = residuals(np.concatenate([x + shifts, x - shifts]))
     return np.asarray((both[: len(x)] - both[len(x) :]).T / (2.0 * _STEP))
 
 
 def _hanging(arm: Arm, body: Poses) -> NDArray[np.float64]:
-    """Direction of an upper arm that hangs at the side of the trunk as it stands, shape (3,)."""
+    """Direction of the upper arm when it hangs beside the trunk in the present pose, shape (3,)."""
     skeleton = arm.skeleton
     shoulder = skeleton.names[arm.joints[arm.shoulder]]
     side = shoulder.partition(".")[0]
     other = f"{'right' if side == 'left' else 'left'}.shoulder"
     rest = skeleton.rest
-    # from the middle of the trunk's root up to the girdle, and out to this side, as the body stands at rest
+    # up from the root of the trunk to the girdle, and outwards to this side, in the rest pose
     root = int(np.flatnonzero(skeleton.parents < 0)[0])
     up = unit(rest[arm.base] - rest[root]) if arm.base != root else np.array([0.0, 1.0, 0.0])
     middle = rest[skeleton.names.index(other)] if other in skeleton.names else rest[arm.base]
     out = rest[arm.joints[arm.shoulder]] - middle
     out = unit(out - up * (out @ up))
-    hanging = np.sin(_OUT) * out - np.cos(_OUT) * up
+    hanging = np.sin(_HANGING_ANGLE) * out - np.cos(_HANGING_ANGLE) * up
     return np.asarray(rotate(body.rotations[0, arm.base], hanging))

@@ -1,4 +1,4 @@
-"""The joint tree: who hangs on whom, where joints rest, about which axes they bend and how far."""
+"""The rest skeleton: joint tree, rest positions, flexion axes and limits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpjld.suggest import did_you_mean
 __all__ = ["ALONG", "CHANNELS", "Segment", "Skeleton"]
 
 ALONG = 0.1
-"""Sine of the angle to a joint's own segment below which an axis only twists it: no flexion axis (R20)."""
+"""Sine of the angle to a joint's own segment below which an axis is no flexion axis but a twist axis (R20)."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Segment:
 
     Attributes:
         proximal: Joint nearer to the root.
-        distal: Joint at the other end; a segment is known by it.
+        distal: Joint at the other end; it identifies the segment.
         palm: Whether the two-segment covering of the palm applies (R19).
     """
 
@@ -49,8 +49,8 @@ class Skeleton:
             segment × axis points to the external side (R20).
         limits: Smallest and largest angle [rad] of each channel, shape (J, 4, 2), channels as in ``CHANNELS``.
         palms: Per hand its palm segments as (proximal, distal) pairs, ulnar to radial; neighbours are adjacent.
-        initial: Angles of the rest pose, counted from straight joints [rad], shape (J, 4) (R25): what all angles are
-            where nothing moves. Zero unless given.
+        initial: Angles of the rest pose, counted from straight joints [rad], shape (J, 4) (R25): the values of all
+            angles that no motion sets. Zero by default.
 
     Examples:
         >>> skeleton = wj.build_hand("left", resolution=1500).skeleton
@@ -100,7 +100,7 @@ class Skeleton:
         return len(self.names)
 
     def index(self, name: str) -> int:
-        """Joint number of a canonical name; the side may be left out where only one hand or limb has it.
+        """Joint index of a canonical name; the side may be left out where only one side has it.
 
         Raises:
             InputError: There is no such joint, or more than one.
@@ -131,8 +131,8 @@ class Skeleton:
 
     @cached_property
     def directions(self) -> NDArray[np.float64]:
-        """Unit rest direction of the bone each joint carries, shape (J, 3): towards the child, or the mean of the
-        children; at an extremity the direction of the segment that ends there."""
+        """Unit rest direction of each joint's bone, shape (J, 3): to the child, or the mean of those to the children;
+        at an extremity that of the segment that ends there."""
         out = np.zeros((len(self), 3))
         for j in range(len(self)):
             kids = [c for c in self.children[j] if np.linalg.norm(self.rest[c] - self.rest[j]) > 1e-9]
@@ -150,15 +150,15 @@ class Skeleton:
 
     @cached_property
     def mirror(self) -> NDArray[np.float64]:
-        """-1 for joints of the left side, +1 elsewhere, shape (J,): the sign of turns that mirror images share."""
+        """-1 for joints of the left side, else +1, shape (J,): sign of rotations that are mirrored between sides."""
         return np.array([-1.0 if name.startswith("left.") else 1.0 for name in self.names])
 
     @cached_property
     def initial_turns(self) -> NDArray[np.float64] | None:
-        """Rotation of every bone from where its joint is straight to rest, about the parent's bone, quaternions
-        x, y, z, w, shape (J, 4); None where all joints are straight at rest.
+        """Rotation of every bone from its joint's straight position to rest, relative to the parent's bone,
+        quaternions x, y, z, w, shape (J, 4); None where all joints are straight at rest.
 
-        In the axes of the rest pose: a rotation looks the same from before and after it.
+        In the axes of the rest pose; these and the straight joint's axes give the same quaternion.
         """
         if not self.initial.any():
             return None
@@ -166,7 +166,7 @@ class Skeleton:
 
     @cached_property
     def straight(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Unit directions and flexion axes of the bones where each joint is straight and its parent at rest, shapes
+        """Unit directions and flexion axes of bones whose joint is straight and whose parent is at rest, shapes
         (J, 3)."""
         if self.initial_turns is None:
             return self.directions, self.axes

@@ -107,7 +107,7 @@ def test_what_is_neither_body_nor_hand_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no upright body .*; and no hand"):
         propose_points(ball.vertices, ball.faces)
     flat = np.array([[0.0, 0, 0], [0, 0, 0], [0, 0, 0]])
-    with pytest.raises(InputError, match="encloses nothing"):
+    with pytest.raises(InputError, match="has no triangles, or no extent"):
         propose_points(flat, np.array([[0, 1, 2]]))
     mitten = trimesh.creation.capsule(height=0.1, radius=0.04)
     with pytest.raises(InputError, match="spread the fingers"):

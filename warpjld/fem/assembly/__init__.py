@@ -1,1 +1,1 @@
-"""Sparse stiffness matrices of 3×3 blocks: their pattern, products and masks."""
+"""Sparse stiffness matrices of 3×3 blocks: sparsity patterns, products and masks."""

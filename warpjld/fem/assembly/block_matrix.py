@@ -1,4 +1,4 @@
-"""Sparse matrices of 3×3 blocks, three degrees of freedom a node."""
+"""Sparse matrices of 3×3 blocks, three degrees of freedom per node."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class IndefiniteError(WarpjldError):
 
 
 def padded(count: int, dtype: Any = np.float64) -> NDArray[Any]:
-    """A zero vector for ``count`` values with room behind it: kernels read three values as four."""
+    """A zero vector of ``count`` values with spare memory behind it: kernels load three values as four."""
     return np.zeros(count + 8, dtype=dtype)[:count]
 
 
 @dataclass(frozen=True, eq=False)
 class BlockMatrix:
-    """N × N blocks in compressed rows; symmetric, both triangles stored.
+    """N × N blocks in compressed row storage (BSR); symmetric, both triangles are stored.
 
     Attributes:
-        rows: Where each row of blocks begins, shape (N + 1,).
+        rows: Start of each block row, shape (N + 1,).
         columns: Column of each block, ascending in a row, shape (B,).
         values: Blocks, shape (B, 3, 3).
     """
@@ -41,7 +41,7 @@ class BlockMatrix:
 
     @property
     def size(self) -> int:
-        """Number of rows of blocks, N."""
+        """Number of block rows, N."""
         return len(self.rows) - 1
 
     @property
@@ -50,7 +50,7 @@ class BlockMatrix:
         return [shared(self.rows), shared(self.columns), shared(self.values.reshape(-1))]
 
     def product(self, x: NDArray[Any], out: NDArray[Any] | None = None, *, threads: int | None = None) -> NDArray[Any]:
-        """A x, shape (3N,)."""
+        """Product A x, shape (3N,)."""
         from warpjld_kernels import fem_blocks
 
         source = padded(3 * self.size, self.values.dtype)
@@ -66,7 +66,7 @@ class BlockMatrix:
 
     @property
     def on_diagonal(self) -> Ints:
-        """Which blocks lie on the diagonal, one for each row, shape (N,)."""
+        """Index of each row's diagonal block, shape (N,)."""
         row = np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.rows))
         return np.flatnonzero(row == self.columns)
 
@@ -75,11 +75,11 @@ class BlockMatrix:
         return np.asarray(self.values[self.on_diagonal])
 
     def masked(self, free: Mask, dtype: Any = np.float64) -> BlockMatrix:
-        """K11 in place: rows and columns of prescribed degrees of freedom set to zero (R107).
+        """K11 at full size: rows and columns of prescribed degrees of freedom are set to zero (R107).
 
         Args:
-            free: Free degrees of freedom, shape (3N,).
-            dtype: Of the result.
+            free: Mask of free degrees of freedom, shape (3N,).
+            dtype: Type of the result's values.
         """
         values = self.values.astype(dtype)
         kept = free.reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Sparsity patterns: of a mesh's stiffness, found once, and of products of three sparse matrices."""
+"""Sparsity patterns of a mesh's stiffness matrix and of products of three sparse matrices."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 __all__ = ["Batches", "Pattern", "ProductPattern", "batches_of", "pattern_of", "triple_product"]
 
 _LEAST_ROWS = 64
-"""Rows below which one thread does all."""
+"""Number of rows below which a single thread is used."""
 
 Rows = tuple[Ints32, Ints32]
-"""A pattern: where each row begins, and its columns."""
+"""A pattern: start of each row, and column indices."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProductPattern:
-    """Rows of a product, n columns wide.
+    """Sparsity pattern of a product with n columns.
 
     Attributes:
-        rows: Where each of R rows begins, shape (R + 1,).
-        columns: Ascending in each row.
-        ranges: Rows with like work, for ``parts`` threads, shape (parts + 1,).
-        marker: Scratch of as many ranges, shape (parts, n).
+        rows: Start of each of R rows, shape (R + 1,).
+        columns: Column indices, ascending in each row.
+        ranges: Bounds of ``parts`` ranges of rows with equal work, shape (parts + 1,).
+        marker: Scratch memory, a row per range, shape (parts, n).
     """
 
     rows: Ints32
@@ -39,7 +39,7 @@ class ProductPattern:
 
 
 def triple_product(first: Rows, second: Rows, third: Rows, width: int, *, threads: int) -> ProductPattern:
-    """Where first · second · third, ``width`` columns wide, may differ from zero."""
+    """Structural nonzeros of first · second · third, with ``width`` columns."""
     from warpjld_kernels import fem_pattern
 
     count = len(first[0]) - 1
@@ -60,18 +60,18 @@ def triple_product(first: Rows, second: Rows, third: Rows, width: int, *, thread
     return ProductPattern(rows, columns, ranges, marker)
 
 
-_LANES = 8  # as in warpjld_kernels.fem_element
+_LANES = 8  # elements per batch, as in warpjld_kernels.fem_element
 
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Block rows of a mesh.
+    """Block sparsity pattern of a mesh's stiffness matrix.
 
     Attributes:
-        rows: Where each node's row begins, shape (N + 1,).
+        rows: Start of each node's block row, shape (N + 1,).
         columns: Neighbours of each node, itself included, ascending, shape (B,).
-        slots: Block that corners (a, b) of an element add to, shape (E, 64).
-        starts: Where each node's elements begin in ``incident``, shape (N + 1,).
+        slots: Index of the block that nodes (a, b) of an element add to, shape (E, 64).
+        starts: Start of each node's elements in ``incident``, shape (N + 1,).
         incident: Elements at each node, ascending, shape (8 E,).
     """
 
@@ -84,7 +84,7 @@ class Pattern:
 
 @dataclass(frozen=True, eq=False)
 class Batches:
-    """Elements eight at a time, for ranges of rows that are assembled side by side (see ``fem_element``)."""
+    """Batches of eight elements, for ranges of rows that are assembled in parallel (see ``fem_element``)."""
 
     ranges: Ints32
     range_batches: Ints32
@@ -94,7 +94,7 @@ class Batches:
 
 
 def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
-    """Block pattern of a mesh.
+    """Block sparsity pattern of a mesh.
 
     Raises:
         InputError: A node that belongs to no element.
@@ -111,7 +111,7 @@ def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
     np.cumsum(used, out=starts[1:])
     incident = (np.argsort(flat, kind="stable") // 8).astype(np.int32)
     numbers = np.arange(len(elements) + 1, dtype=np.int32)
-    # node → its elements → themselves → their nodes
+    # node–element incidence · identity · element–node incidence
     product = triple_product((starts, incident), (numbers, numbers[:-1]), (8 * numbers, flat), count, threads=workers)
     slots = np.empty((len(elements), 64), np.int32)
     on_rows(
@@ -124,7 +124,7 @@ def pattern_of(mesh: HexMesh, *, threads: int | None = None) -> Pattern:
 
 
 def batches_of(pattern: Pattern, kinds: Ints32, parts: int) -> Batches:
-    """Divide the rows into ``parts`` ranges of like work, and the elements that touch each into batches of one kind."""
+    """Divide the rows into ``parts`` ranges of equal work, and the elements of each range into batches of one law."""
     count = len(pattern.starts) - 1
     edges = np.searchsorted(pattern.starts, np.linspace(0, pattern.starts[-1], parts + 1)).astype(np.int32)
     edges[0], edges[-1] = 0, count

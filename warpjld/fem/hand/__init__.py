@@ -1,4 +1,4 @@
-"""A hand as a deformable body: flesh driven by poses, what its muscles can do, and what its skin feels (B §3.3)."""
+"""A hand as a deformable body: flesh driven by poses, limits of its muscles, and labels of its skin (B §3.3)."""
 
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.fem.hand.laws import hand_laws

@@ -1,12 +1,12 @@
-"""A hand's flesh in some pose without what touches it: what bent joints strain on their own (R118).
+"""Equilibria of a hand's flesh in a pose without contact: the forces of bent joints on their own (R118).
 
-Reactions that hold the bones of a pressed hand balance two things: contact, and flesh that is strained because joints
-are bent. Muscles' work is the former. The latter is found by an equilibrium of the hand's own mesh, without contact.
+Reactions at the bones of a pressed hand balance two things: contact, and flesh that is strained because joints are
+bent. Only the former is work of muscles. The latter is found by an equilibrium of the hand's own mesh without contact.
 
-It is gone to as a hand that nothing touches goes there: from the nearest pose that is known, the flesh carried along by
-its bones, by way of poses between where that is too far. From one frame to the next Newton's method takes two or three
-steps; and where skin could fold either way, it folds as it would without contact. The pressed shape is no place to
-start from: with the forces that press it, but without what presses, hard pressed flesh is unstable.
+This equilibrium is approached as an untouched hand would approach it: from the nearest known pose, with the flesh
+carried along by its bones, by way of poses in between if that is too far. From frame to frame Newton's method takes two
+or three steps; and where skin could fold in either direction, it folds as without contact. The pressed shape is no
+suitable start: without the object that presses it, heavily compressed flesh is unstable.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ from warpjld.skeleton.kinematics import Poses
 __all__ = ["FleshAlone", "Untouched"]
 
 _STEPS = 12
-"""Newton steps; where more are needed the pose between is a better start."""
+"""Largest number of Newton steps; if more are needed, a pose in between is a better start."""
 _SHORTEST = 0.05  # share of the step below which the line search gives up
 _HALVINGS = 6
-"""Times a way to another pose may be cut in two."""
+"""Largest number of bisections of the path between two poses."""
 _TOLERANCE = 1e-4
-"""Residual over the forces that hold the bones, or over the contact forces that are missing where those are less."""
+"""Largest residual, per reactions at the bones, or per removed contact forces if these are smaller."""
 _ROUNDING = 1e-7
-"""Residual over the latter that is not worth a step."""
-_KEPT = 16  # poses whose equilibrium is remembered
+"""Residual, per removed contact forces, below which no step is made."""
+_KEPT = 16  # number of poses whose equilibrium is kept
 
 
 @dataclass(frozen=True, eq=False)
 class Untouched:
-    """Equilibrium of a hand that nothing touches.
+    """Equilibrium of a hand without contact.
 
     Attributes:
-        poses: One pose.
-        displacement: [m], shape (N, 3).
-        reactions: Forces that hold the prescribed nodes [N], zero elsewhere, shape (N, 3).
+        poses: A single pose.
+        displacement: Displacement of the nodes [m], shape (N, 3).
+        reactions: Reactions at the prescribed nodes [N], zero elsewhere, shape (N, 3).
     """
 
     poses: Poses
@@ -61,13 +61,13 @@ class Untouched:
 
 
 class FleshAlone:
-    """Equilibria without contact, each pose's found once.
+    """Equilibria without contact; recent ones are cached.
 
     Args:
-        hand: At rest.
+        hand: The hand at rest.
         body: Its own mesh and laws.
-        degrees: Prescribed degrees of freedom, shape (n,): those of bones, and of nodes where flesh was cut off.
-        rest: The pose in which nothing is displaced.
+        degrees: Prescribed degrees of freedom, shape (n,): of bones, and of nodes where flesh was cut off.
+        rest: The pose without displacements.
 
     Attributes:
         body, degrees: As given.
@@ -93,17 +93,17 @@ class FleshAlone:
         contact: NDArray[np.float64],
         loads: Loads | None = None,
     ) -> Untouched | None:
-        """The hand with its bones as they are and nothing that touches it; None where no equilibrium is found.
+        """Equilibrium of the hand with given bones and without contact; None if none is found.
 
         Args:
-            poses: One pose.
-            displacement: Of an equilibrium with contact in that pose [m], shape (N, 3).
-            reactions: Forces that hold its prescribed nodes [N], shape (N, 3).
+            poses: A single pose.
+            displacement: Displacement of an equilibrium with contact in that pose [m], shape (N, 3).
+            reactions: Reactions at its prescribed nodes [N], shape (N, 3).
             contact: Contact forces on its nodes [N], shape (N, 3).
-            loads: What else pulls, and stays.
+            loads: Other loads, which remain.
 
         Raises:
-            InputError: Other shapes.
+            InputError: Wrong shapes.
         """
         for name, array in (("displacement", displacement), ("reactions", reactions), ("contact", contact)):
             if array.shape != self.body.mesh.nodes.shape:
@@ -115,16 +115,16 @@ class FleshAlone:
             return self._known[nearest]
         if contact.any():
             pushed = norm(contact.reshape(-1))
-            found = self._from(self._known[nearest], poses, bones, pushed, loads or Loads(), _HALVINGS)
+            found = self._in_steps(self._known[nearest], poses, bones, pushed, loads or Loads(), _HALVINGS)
         else:
             found = Untouched(poses, displacement, reactions)
         if found is not None:
             if len(self._known) > _KEPT:
-                self._known.pop(1)  # rest stays
+                self._known.pop(1)  # the first, at rest, stays
             self._known.append(found)
         return found
 
-    def _from(
+    def _in_steps(
         self,
         before: Untouched,
         poses: Poses,
@@ -133,21 +133,21 @@ class FleshAlone:
         loads: Loads,
         halvings: int,
     ) -> Untouched | None:
-        """From another pose, by way of the one between where that is too far."""
+        """Equilibrium reached from that of another pose, by way of poses in between if necessary."""
         found = self._newton(before, poses, bones, pushed, loads)
         if found is None and halvings > 0:
             between = halfway(self._hand, before.poses, poses)
-            half = self._from(before, between, self._bones(between), pushed, loads, halvings - 1)
+            half = self._in_steps(before, between, self._prescribed_values(between), pushed, loads, halvings - 1)
             if half is not None:
-                found = self._from(half, poses, bones, pushed, loads, halvings - 1)
+                found = self._in_steps(half, poses, bones, pushed, loads, halvings - 1)
         return found
 
     def _moves(self, poses: Poses) -> Moves:
-        """Motions of the bones from rest."""
+        """Rigid motions of the bones from rest."""
         return self._start.to(self._hand.moves(poses))
 
-    def _bones(self, poses: Poses) -> NDArray[np.float64]:
-        """Where that takes the prescribed degrees of freedom, shape (n,)."""
+    def _prescribed_values(self, poses: Poses) -> NDArray[np.float64]:
+        """Prescribed displacements in a pose, shape (n,)."""
         nodes = self.degrees[::3] // 3
         x = self.body.mesh.nodes[nodes]
         return (self._moves(poses).blended(self._hand.weights[nodes], x) - x).reshape(-1)
@@ -155,13 +155,13 @@ class FleshAlone:
     def _newton(
         self, before: Untouched, poses: Poses, bones: NDArray[np.float64], pushed: float, loads: Loads
     ) -> Untouched | None:
-        """Another pose by Newton's method, if that is near enough."""
+        """Equilibrium of a pose by Newton's method from that of another; None if it does not converge."""
         elastic, free, damping = self._elastic, self._free, self._damping
         u = self._hand.guess(self._moves(before.poses), self._moves(poses), before.displacement).reshape(-1)
         u[self.degrees] = bones
         if not elastic.upright(u):
             return None
-        # a guess squeezes elements here and there, an equilibrium does not
+        # pressures of the previous equilibrium, since the guess compresses single elements
         pressures = elastic.pressures(before.displacement.reshape(-1))
         self._solver.begin()
         damping.begin()
@@ -185,7 +185,7 @@ class FleshAlone:
         return None
 
     def _move(self, tangent: Tangent, residual: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """A Newton step (3N,), damped as far as its matrix asks for it; None where that is no help."""
+        """A Newton step (3N,), damped as far as needed; None if that fails."""
         assert tangent.stiffness is not None
         while True:
             try:

@@ -1,4 +1,4 @@
-"""Rigid motions of bones, and flesh carried along by them."""
+"""Rigid motions of bones, and their blending for the flesh by dual quaternions."""
 
 from __future__ import annotations
 
@@ -26,34 +26,34 @@ class Moves:
     shifts: NDArray[np.float64]
 
     def of(self, bone: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points (n, 3) [m] go, each with its own bone (n,)."""
+        """Positions of points (n, 3) [m] moved by their bones (n,), shape (n, 3)."""
         from scipy.spatial.transform import Rotation
 
         moved: NDArray[np.float64] = Rotation.from_quat(self.turns[bone]).apply(points) + self.shifts[bone]
         return moved
 
     def still(self) -> Moves:
-        """No motion of as many bones."""
+        """Identity for the same number of bones."""
         return Moves(np.tile([0.0, 0.0, 0.0, 1.0], (len(self.turns), 1)), np.zeros_like(self.shifts))
 
     def to(self, after: Moves) -> Moves:
-        """The motions that lead from here to there."""
+        """The motions from these positions to those of ``after``."""
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_quat(after.turns) * Rotation.from_quat(self.turns).inv()
         return Moves(turn.as_quat(), after.shifts - turn.apply(self.shifts))
 
     def blended(self, weights: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points go under blended motions: dual quaternions (Kavan et al. 2007, doi:10.1145/1230100.1230107).
+        """Points moved by blended motions: dual quaternions (Kavan et al. 2007, doi:10.1145/1230100.1230107).
 
         The blend of rigid motions is rigid at every point, so nearly incompressible flesh starts a step with little
-        false pressure.
+        spurious pressure.
 
         Args:
-            weights: Share of the bones in the points, rows summing to one, shape (n, B).
+            weights: Weights of the bones at the points, rows summing to one, shape (n, B).
             points: [m], shape (n, 3).
         """
-        real = self.turns * _halves(self.turns, weights)[:, None]
+        real = self.turns * _hemisphere_signs(self.turns, weights)[:, None]
         vector, scalar = real[:, :3], real[:, 3:]
         dual = 0.5 * np.concatenate(
             [
@@ -72,12 +72,12 @@ class Moves:
 
 
 def moves_of(poses: Poses, frame: int, parents: Sequence[int], rest: NDArray[np.float64]) -> Moves:
-    """Motions from rest of the bones that these joints (B,) carry.
+    """Rigid motions from rest of the bones that these joints (B,) carry.
 
     Args:
-        poses: Final positions of the skeleton.
-        frame: One of its frames.
-        parents: Near joint of each bone.
+        poses: Poses of the skeleton.
+        frame: Frame of the poses.
+        parents: Proximal joint of each bone.
         rest: Rest positions of the joints [m], shape (J, 3).
     """
     from scipy.spatial.transform import Rotation
@@ -87,16 +87,16 @@ def moves_of(poses: Poses, frame: int, parents: Sequence[int], rest: NDArray[np.
     return Moves(turn.as_quat(), poses.positions[frame, joints] - turn.apply(rest[joints]))
 
 
-def _halves(turns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sign of each bone's quaternion, shape (B,): bones that share points turn the short way into one another.
+def _hemisphere_signs(turns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sign of each bone's quaternion, shape (B,), such that bones that share points blend along the shorter arc.
 
-    In a fist a fingertip turns by more than half a circle, but from bone to bone it is far less: signs go from each to
-    the one that it shares most with.
+    In a fist a fingertip is rotated by more than half a turn from rest, but from bone to bone by far less: signs are
+    propagated from each bone to the one with most shared weight (a spanning tree).
     """
     from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
     shared = weights.T @ weights
-    # whoever shares nothing is tied last, by the least of weights: the tree reaches all
+    # a small constant links bones without shared weight, so that the tree is connected
     links = minimum_spanning_tree(-(shared + 1e-12 * (1.0 + shared.max())))
     order, before = breadth_first_order(links, 0, directed=False)
     signs = np.ones(len(turns))

@@ -1,13 +1,13 @@
-"""Forces and moments on each bone of a hand: from what holds its nodes, or from what touches the skin (B eq. 8, R118).
+"""Forces and moments on each bone of a hand, from reactions at its nodes or from contact forces (B eq. 8, R118).
 
-A force on a node goes to the bones that move it. A bone's own nodes are moved by it alone; nodes where flesh was cut
-off follow several bones by their weights (``Part.cut``), and hand what they bear on to them by the same weights, so the
-sum over all bones is the sum of all reactions.
+A nodal force is distributed to the bones that move the node. A bone's own nodes are moved by it alone; nodes where
+flesh was cut off follow several bones by their weights (``Part.cut``), and their forces are distributed by the same
+weights, so the sum over all bones is the sum of all reactions.
 
-**Which of the two.** Reactions are exact: they are in equilibrium with contact, whatever the flesh does. They hold the
-flesh of bent joints in shape, too, so those of the same pose without contact are taken off (``FleshAlone``).
-Contact forces handed on by nearness (``loads_from_contact``) need no second equilibrium. They differ where they act
-near a joint, whose bones share them otherwise than by nearness: ``warpjld.simulation.report.efforts`` says by how much.
+Reactions are exact: they are in equilibrium with contact. They include the forces that strain the flesh of bent joints,
+so those of the same pose without contact are subtracted (``FleshAlone``). Contact forces distributed by weights
+(``loads_from_contact``) need no second equilibrium, but are inexact near joints, whose bones do not share them by
+weight: ``warpjld.simulation.report.efforts`` reports the difference.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class BoneLoads:
     """Force and moment on every bone.
 
     Attributes:
-        bones: Joint at the far end of each bone, as the skeleton numbers them.
+        bones: Distal joint of each bone, as an index of the skeleton.
         force: [N], shape (B, 3).
         moment: About the origin [N m], shape (B, 3).
     """
@@ -44,35 +44,35 @@ class BoneLoads:
 def loads_from_reactions(
     hand: FleshHand, displacement: NDArray[np.float64], reactions: NDArray[np.float64]
 ) -> BoneLoads:
-    """Minus the reactions that hold bones and cut nodes: what flesh and contact put on every bone.
+    """Negative reactions at bones and cut nodes: the loads of flesh and contact on every bone.
 
     Args:
         hand: The hand.
-        displacement: Of all nodes [m], shape (N, 3) or longer (bodies merged after the hand).
-        reactions: Forces that hold the prescribed nodes [N], of the same shape.
+        displacement: Displacement of all nodes [m], shape (N, 3) or longer (with bodies merged after the hand).
+        reactions: Reactions at the prescribed nodes [N], of the same shape.
 
     Raises:
-        InputError: Other shapes.
+        InputError: Wrong shapes.
     """
-    return _handed_on(hand, displacement, -reactions)
+    return _distributed(hand, displacement, -reactions)
 
 
 def loads_from_contact(hand: FleshHand, displacement: NDArray[np.float64], nodal: NDArray[np.float64]) -> BoneLoads:
-    """Contact forces on the skin handed on to the bones by nearness: an estimate that needs no equilibrium.
+    """Contact forces distributed to the bones by weights: an estimate that needs no equilibrium.
 
     Args:
         hand: The hand.
-        displacement: Of all nodes [m], shape (N, 3) or longer.
+        displacement: Displacement of all nodes [m], shape (N, 3) or longer.
         nodal: Contact force on every node [N], of the same shape.
 
     Raises:
-        InputError: Other shapes.
+        InputError: Wrong shapes.
     """
-    return _handed_on(hand, displacement, nodal)
+    return _distributed(hand, displacement, nodal)
 
 
-def _handed_on(hand: FleshHand, displacement: NDArray[np.float64], forces: NDArray[np.float64]) -> BoneLoads:
-    """Forces on nodes, each given to the bones by its node's weights."""
+def _distributed(hand: FleshHand, displacement: NDArray[np.float64], forces: NDArray[np.float64]) -> BoneLoads:
+    """Nodal forces distributed to the bones by the nodes' weights."""
     count = len(hand.mesh.nodes)
     for name, array in (("displacement", displacement), ("forces", forces)):
         if array.ndim != 2 or array.shape[1] != 3 or len(array) < count:

@@ -1,4 +1,4 @@
-"""The last segment of a digit by itself, finely meshed: pulp, skin, bone and nail (R105)."""
+"""A finely meshed distal segment of a digit: pulp, skin, bone and nail (R105)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ __all__ = ["Fingertip", "build_fingertip"]
 
 @dataclass(frozen=True, eq=False)
 class Fingertip:
-    """A fingertip cut off at its last joint.
+    """A fingertip, cut off at its last joint.
 
     Attributes:
         mesh: Regions ``tip.pulp``, ``tip.skin`` (within ``skin`` of the surface), ``tip.bone``; faces ``tip`` are the
             skin without the cut; node set ``held`` is bone, nail and cut.
-        fit: Quality of the mesh.
+        fit: Mesh with quality measures.
         along: Unit direction of the segment, towards the tip, shape (3,).
         back: Unit direction towards the nail, shape (3,).
         joint: The last joint [m], shape (3,).
@@ -40,7 +40,7 @@ class Fingertip:
     thickness: float
 
     def facing(self, tilt: float) -> NDArray[np.float64]:
-        """Unit normal, out of the pulp, of a plate that the finger leans on by an angle [rad] between plate and
+        """Unit normal, outwards from the pulp, of a plate that the finger touches at an angle [rad] between plate and
         segment: 0 lies flat, π/2 stands on its tip."""
         return -np.cos(tilt) * self.back + np.sin(tilt) * self.along
 
@@ -58,19 +58,19 @@ def build_fingertip(
 ) -> Fingertip:
     """Cut a fingertip off a hand's surface and mesh it.
 
-    The bone is an ellipse in section, tapered to its rounded end; its size is given over the height of the finger at
-    the joint, from nail to pulp. The defaults are a distal phalanx some 8 mm wide and 5 mm high in a finger of
+    The bone has an elliptic section and tapers to its rounded end; its size is relative to the height of the finger at
+    the joint, from nail to pulp. The defaults give a distal phalanx some 8 mm wide and 5 mm high in a finger of
     13.5 mm, over 6 mm of pulp: proportions of an adult's index finger, from memory.
 
     Args:
         rig: Surface and skeleton.
-        digit: Digit, or ``left.index``.
+        digit: Digit, such as ``index`` or ``left.index``.
         spacing: Edge length of the elements [m].
         skin: Depth of the region ``tip.skin`` under the surface [m].
-        bone: Half width and half height of the bone over the finger's height.
-        raised: Its shift towards the nail over that height.
-        reach: Where the bone ends, as a share of the length from joint to skin.
-        nail: Where the nail begins, as a share of that length; it covers the back from there on.
+        bone: Half width and half height of the bone, per height of the finger.
+        raised: Its shift towards the nail, per that height.
+        reach: End of the bone, as a share of the length from joint to skin.
+        nail: Start of the nail, as a share of that length; it covers the back from there on.
 
     Raises:
         InputError: No such digit, or a spacing that makes no mesh.
@@ -85,7 +85,7 @@ def build_fingertip(
     back = np.cross(along, across)
     vertices, faces = _cut(rig.surface.vertices, rig.surface.faces, joint, along, skeleton.rest[far])
     envelope = Envelope(vertices, faces)
-    # rows of elements follow the bone: the grid is laid in the finger's own directions
+    # the grid is aligned with the finger, so that rows of elements follow the bone
     frame = np.stack([across, back, along])
     fit = fit_mesh(Envelope((vertices - joint) @ frame.T, faces), spacing, name="tip.pulp")
     mesh = replace(fit.mesh, nodes=fit.mesh.nodes @ frame + joint)
@@ -131,10 +131,10 @@ def _in_bone(
     raised: float,
     reach: float,
 ) -> NDArray[np.bool_]:
-    """Which points lie in the bone, shape (n,): it tapers a little towards its end, then closes in a half ellipse.
+    """Mask of points in the bone, shape (n,): it tapers slightly and ends in a half ellipse.
 
     Args:
-        share: Place along the phalanx over its length; ``side`` and ``up``: across it, over its height.
+        share: Position along the phalanx, per its length; ``side`` and ``up``: across it, per its height.
         bone, raised, reach: As of ``build_fingertip``.
     """
     end = np.clip((share - reach) / 0.12 + 1.0, 0.0, 1.0)
@@ -150,7 +150,7 @@ def _cut(
     normal: NDArray[np.float64],
     inside: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """The part of a closed surface beyond a plane that surrounds a point, closed by a fan."""
+    """The part of a closed surface beyond a plane that contains a point, closed by a triangle fan."""
     import pyvista
 
     whole = pyvista.PolyData.from_regular_faces(vertices, faces)

@@ -1,4 +1,4 @@
-"""A hand as a deformable body: its volume, bones that follow poses, and skin that knows its segments (R105, R110)."""
+"""A hand as a deformable body: volume mesh, bones driven by poses, and labelled skin (R105, R110)."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ __all__ = ["FleshHand", "build_flesh_hand"]
 
 @dataclass(frozen=True, eq=False)
 class FleshHand:
-    """The volume of a hand, driven by the poses of its skeleton.
+    """Volume mesh of a hand, driven by poses of its skeleton.
 
     Attributes:
-        name: Begins the names of its regions (see ``hand_regions``); its skin is the face set of this name.
-        flesh: The mesh with its bones, and the rig's own surface carried by it.
-        skeleton: The rest skeleton, as in the rig.
-        surface: The rig's surface at rest, as in the rig.
-        place: Where the hand as a whole rests: rigid motion from the rig's rest (see ``placed``).
-        weights: Share of each bone in every node, rows summing to one, shape (N, B).
-        skin_faces: Element and local face of the skin, shape (F, 2).
-        skin_labels: Label of each of them, shape (F,).
+        name: Prefix of its region names (see ``hand_regions``), and name of the face set of its skin.
+        flesh: The mesh with its bones, and the rig's surface embedded in it.
+        skeleton: The rig's rest skeleton.
+        surface: The rig's surface at rest.
+        place: Rigid motion of the hand as a whole from the rig's rest (see ``placed``).
+        weights: Weight of each bone at every node, rows summing to one, shape (N, B).
+        skin_faces: Element and local face of each skin face, shape (F, 2).
+        skin_labels: Label of each skin face, shape (F,).
         label_names: ``left.index.distal``, ``left.palm.index``, ``left.wrist``, …; ``….web`` near another digit.
-        excluded: Pairs of labels that never touch, shape (L, L) (R127).
-        skin_fringes: Share with which skin faces touch others of their own finger, shape (F,).
+        excluded: Pairs of labels that are never in contact, shape (L, L) (R127).
+        skin_fringes: Factor of each skin face for contact with faces of the same finger, shape (F,).
     """
 
     name: str
@@ -57,7 +57,7 @@ class FleshHand:
 
     @property
     def mesh(self) -> HexMesh:
-        """Its mesh. Merge it first with others: node numbers of this class then stay valid."""
+        """Its mesh. When merged with others, it must come first, so that its node indices stay valid."""
         return self.flesh.mesh
 
     @cached_property
@@ -72,25 +72,25 @@ class FleshHand:
 
     @cached_property
     def node_labels(self) -> NDArray[np.int32]:
-        """Label of every node of the skin, -1 inside, shape (N,): that of most faces around it, webs counted as the
-        segment they belong to."""
+        """Label of every skin node, -1 inside, shape (N,): the most frequent among its faces, where webs count as their
+        segment."""
         plain = np.array([self.label_names.index(name.removesuffix(WEB)) for name in self.label_names])
         votes = np.zeros((len(self.mesh.nodes), len(self.label_names)), np.int32)
         np.add.at(votes, (self.mesh.quads(self.skin_faces), plain[self.skin_labels][:, None]), 1)
         return np.where(votes.any(axis=1), votes.argmax(axis=1), -1).astype(np.int32)
 
     def self_contact(self) -> Exclusion:
-        """What of the skin never meets, for the skin against itself (R126, R127)."""
+        """Parts of the skin that are excluded from self-contact (R126, R127)."""
         labels, joined = self.skin_labels, joined_pairs(self.label_names)
         return Exclusion(labels, labels, self.excluded, joined, self.skin_fringes)
 
     def moves(self, poses: Poses, frame: int = 0) -> Moves:
-        """Rigid motion of every bone from where it rests."""
+        """Rigid motion of every bone from its rest position."""
         self._check(poses)
         return self.place.to(moves_of(poses, frame, self.flesh.parents, self.skeleton.rest))
 
     def rest_pose(self) -> Poses:
-        """The pose in which nothing is displaced."""
+        """The pose without displacements."""
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_quat(self.place.turns[0])
@@ -99,7 +99,7 @@ class FleshHand:
         return Poses((turn.apply(self.skeleton.rest) + self.place.shifts[0])[None], turns, rest.flexion)
 
     def skin(self, displacement: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """The rig's own surface, deformed [m], shape (V, 3) (R104); ``displacement`` (N, 3), at rest if left out."""
+        """The rig's surface, deformed by ``displacement`` (N, 3) or at rest [m], shape (V, 3) (R104)."""
         from scipy.spatial.transform import Rotation
 
         out = Rotation.from_quat(self.place.turns[0]).apply(self.surface.vertices) + self.place.shifts[0]
@@ -107,7 +107,7 @@ class FleshHand:
         return moved
 
     def prescribed(self, poses: Poses, frame: int = 0) -> Prescribed:
-        """Displacements from rest of every bone's nodes under a pose (R110)."""
+        """Displacements from rest of every bone's nodes in a pose (R110)."""
         return self.prescribed_by(self.moves(poses, frame))
 
     def prescribed_by(self, moves: Moves) -> Prescribed:
@@ -123,12 +123,12 @@ class FleshHand:
     def guess(
         self, before: Moves, after: Moves, displacement: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """First guess of a step's end: bones exact, flesh carried on by their blended motion [m], shape (N, 3).
+        """Initial guess of the displacement after a step: bones exact, flesh by blended motion [m], shape (N, 3).
 
         Args:
-            before: Where the bones were.
-            after: Where they are going.
-            displacement: Displacement of all nodes where they were, by default what the blend itself gives from rest.
+            before: Motion of the bones before the step.
+            after: Motion of the bones after it.
+            displacement: Displacement of all nodes before the step; by default what the blended motion gives from rest.
                 Rows beyond this hand's nodes (of bodies merged after it) are kept.
         """
         count = len(self.mesh.nodes)
@@ -144,7 +144,7 @@ class FleshHand:
         return out
 
     def placed(self, poses: Poses, frame: int = 0) -> FleshHand:
-        """The same hand at rest elsewhere: moved as a whole, as the root of a pose is, so that no step has to."""
+        """The same hand with its rest moved rigidly to the root of a pose, so that no step has to do this."""
         self._check(poses)
         root = int(np.flatnonzero(self.skeleton.parents < 0)[0])
         whole = moves_of(poses, frame, [root], self.skeleton.rest)
@@ -172,25 +172,26 @@ def build_flesh_hand(
     least: float = 0.1,
     apart: float = 2.5,
 ) -> FleshHand:
-    """Mesh a hand and get it ready to be driven.
+    """Mesh a hand and prepare it to be driven by poses.
 
     Args:
         rig: Surface and skeleton.
-        spacing: Edge length of the elements [m]. An index finger pressed 2.7 mm onto a plate answers with 2.66, 2.57,
-            2.34, 2.47, 3.24, 2.39 and 0.62 N at 1.5, 2.2, 2.6, 3, 3.5, 4 and 5 mm (``examples/flesh_sizes.py``):
-            above 3 mm for a first look only, see ``coarse_note``.
-        name: Begins the names of regions, and names the face set of the skin.
-        skin: Depth of the skin [m]: elements that it fills in part are partly as stiff as it.
-        bone: Radius of a bone over the depth of its segment under the skin.
-        flush: Shift of the bone towards the back over that depth.
-        gap: Part of a segment that is left soft at its near end and at fingertips: the flesh in a flexed joint has to
-            stretch between the bones.
-        head: Part that is left soft at its far end: the head of the bone makes the knuckle.
-        least: Least scaled Jacobian.
-        apart: Skin nearer to another digit than this many spacings at rest is web and never touches what is as near.
+        spacing: Edge length of the elements [m]. An index finger pressed 2.7 mm onto a plate gives 2.66, 2.57, 2.34,
+            2.47, 3.24, 2.39 and 0.62 N at 1.5, 2.2, 2.6, 3, 3.5, 4 and 5 mm (``examples/flesh_sizes.py``): above 3 mm
+            for previews only, see ``coarse_note``.
+        name: Prefix of region names, and name of the face set of the skin.
+        skin: Depth of the skin [m]; elements that it fills partly have mixed stiffness.
+        bone: Radius of a bone, per depth of its segment under the skin.
+        flush: Shift of the bone towards the back, per that depth.
+        gap: Share of a segment that is left soft at its proximal end and at fingertips: in a flexed joint the flesh
+            between the bones has to stretch.
+        head: Share that is left soft at its distal end: the head of the bone forms the knuckle.
+        least: Smallest scaled Jacobian.
+        apart: Skin closer at rest to another digit than this many spacings is web, which is excluded from contact with
+            skin as close as that.
 
     Raises:
-        InputError: A surface or spacing that makes no mesh.
+        InputError: A surface or spacing that cannot be meshed.
     """
     flesh = flesh_of(rig, spacing, bone=bone, flush=flush, gap=gap, head=head, least=least)
     mesh = flesh.mesh

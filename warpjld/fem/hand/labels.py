@@ -1,4 +1,4 @@
-"""Which segment every part of the skin belongs to, and which parts never touch one another (R126, R127)."""
+"""Labels of the skin by segment, and pairs of labels that are excluded from contact (R126, R127)."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ __all__ = ["WEB", "excluded_pairs", "fringes", "joined_pairs", "segment_name", "
 _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": "palm", "carpometacarpal": "wrist"}
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
 _BETWEEN = "middle"
-"""Phalanx between a finger's first and last; thumbs have none."""
+"""Phalanx between a finger's first and last; a thumb has none."""
 WEB = ".web"
-"""Ends the label of skin near another digit at rest: where fingers part, and sides that lie together."""
+"""Suffix of labels of skin near another digit at rest: between fingers, and on adjacent sides."""
 
 
 def segment_name(joint: str) -> str:
-    """What the segment that ends at a joint is called: ``index.distal``, ``palm.index``, ``thumb.proximal``, ``wrist``.
+    """Name of the segment that ends at a joint: ``index.distal``, ``palm.index``, ``thumb.proximal``, ``wrist``.
 
-    Joints that belong to no hand keep their own name. The side is kept in front: ``left.index.distal``.
+    Joints that belong to no hand keep their names. The side is kept as a prefix: ``left.index.distal``.
     """
     parts = joint.split(".")
     side = parts[0] + "." if parts[0] in ("left", "right") else ""
@@ -42,17 +42,17 @@ def skin_labels(
 ) -> tuple[NDArray[np.int32], tuple[str, ...]]:
     """Label of each skin face, and the names of the labels.
 
-    A face belongs to the segment whose bone carries most of it. Parts of the digits that lie within ``near`` of another
-    digit at rest are webs: they get labels of their own, so that excluding them leaves the rest of the digit. Labels of
-    the palm come first, then digit by digit: of two labels one is the slave of the other, and along the border of two
-    labels of the palm, or of a web, a fingertip must not change sides.
+    A face belongs to the segment whose bone has the largest weight. Faces of a digit within ``near`` of another digit
+    at rest are webs, with labels of their own, so that excluding them does not exclude the rest of the digit. Labels of
+    the palm come first, then those of each digit: their order decides which of two labels is the slave, and a fingertip
+    on the border of two labels of the palm, or of a web, must not switch between slave and master.
 
     Args:
-        mesh: At rest.
+        mesh: Mesh at rest.
         faces: Skin faces, shape (F, 2).
-        weights: Weights of the bones on the nodes, shape (N, B).
-        joints: Joint at the far end of each bone.
-        near: [m]
+        weights: Weights of the bones at the nodes, shape (N, B).
+        joints: Distal joint of each bone.
+        near: Distance to other digits below which skin is web [m].
     """
     from scipy.spatial import cKDTree
 
@@ -78,11 +78,11 @@ def skin_labels(
                 webs[kind] = len(names)
                 names.append(names[kind] + WEB)
             out[face] = webs[kind]
-    return _grouped(out, names)
+    return _reordered(out, names)
 
 
-def _grouped(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
-    """Labels and their names in another order, those of the palm first and those of a digit together."""
+def _reordered(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
+    """Labels and their names, reordered such that the palm's come first and a digit's are contiguous."""
     digits = list(dict.fromkeys(["", *map(_digit, names)]))
     order = sorted(range(len(names)), key=lambda k: digits.index(_digit(names[k])))
     rank = np.empty(len(names), np.int32)
@@ -93,7 +93,7 @@ def _grouped(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[np
 def joined_pairs(names: Sequence[str]) -> NDArray[np.bool_]:
     """Pairs of labels that belong together, symmetric, shape (L, L).
 
-    They are: a label with itself; segments of one digit; a first phalanx and its metacarpal; parts of the palm and the
+    These are: a label with itself; segments of one digit; a first phalanx and its metacarpal; parts of the palm and the
     wrist.
     """
     count = len(names)
@@ -108,16 +108,16 @@ def joined_pairs(names: Sequence[str]) -> NDArray[np.bool_]:
 def fringes(
     mesh: HexMesh, faces: NDArray[np.int32], label: NDArray[np.int32], names: Sequence[str], width: float
 ) -> NDArray[np.float64]:
-    """Share with which faces of a finger's first and last phalanx meet each other, shape (F,).
+    """Contact factor between faces of a finger's first and last phalanx, shape (F,).
 
-    Where they border on the phalanx between them, which never meets its neighbours, they do not; it grows from there.
+    It is 0 at the border to the phalanx between them, which is excluded from contact with both, and grows from there.
 
     Args:
-        mesh: At rest.
+        mesh: Mesh at rest.
         faces: Skin faces, shape (F, 2).
         label: Their labels, shape (F,).
         names: Names of the labels.
-        width: Distance from that phalanx at which they meet as others do [m].
+        width: Width of the transition [m]: the factor is 0 up to half a width from that phalanx, 1 from 1.5 widths.
     """
     from scipy.spatial import cKDTree
 
@@ -136,17 +136,17 @@ def fringes(
 def excluded_pairs(
     mesh: HexMesh, faces: NDArray[np.int32], label: NDArray[np.int32], names: Sequence[str], near: float
 ) -> NDArray[np.bool_]:
-    """Pairs of labels that are never tested for contact, symmetric, shape (L, L) (R127).
+    """Pairs of labels that are excluded from contact, symmetric, shape (L, L) (R127).
 
-    They are those that belong together (``joined_pairs``), but for the first phalanx of a finger and its last, which
-    meet in a tight fist; and whatever lies within ``near`` of one another at rest: webs, and digits drawn side by side.
+    These are pairs that belong together (``joined_pairs``), except for a finger's first and last phalanx, which touch
+    in a tight fist; and all pairs within ``near`` of each other at rest: webs, and digits modelled side by side.
 
     Args:
-        mesh: At rest.
+        mesh: Mesh at rest.
         faces: Skin faces, shape (F, 2).
         label: Their labels, shape (F,).
         names: Names of the labels.
-        near: [m]
+        near: Distance below which pairs are excluded [m].
     """
     from scipy.spatial import cKDTree
 
@@ -167,7 +167,7 @@ def excluded_pairs(
 
 
 def _digit(name: str) -> str:
-    """Digit with its side, or nothing for palm, wrist and forearm."""
+    """Digit with its side; empty for palm, wrist and forearm."""
     parts = name.removesuffix(WEB).split(".")
     if len(parts) > 1 and parts[-2] in DIGITS:
         return ".".join(parts[:-1])
@@ -175,13 +175,13 @@ def _digit(name: str) -> str:
 
 
 def _base_of(palm: str, phalanx: str) -> bool:
-    """Whether a part of the palm lies over the metacarpal that carries this first phalanx."""
+    """Whether a part of the palm lies over the metacarpal that carries this proximal phalanx."""
     *side, kind, digit = palm.removesuffix(WEB).rsplit(".", 2)
     return kind == "palm" and phalanx.removesuffix(WEB) == ".".join([*side, digit, "proximal"])
 
 
 def _segment(name: str) -> str:
-    """``distal`` of ``left.index.distal``."""
+    """Last part of a name: ``distal`` of ``left.index.distal``."""
     return name.removesuffix(WEB).rpartition(".")[2]
 
 

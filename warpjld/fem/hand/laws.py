@@ -10,9 +10,9 @@ from warpjld.fem.material.materials import Fung, Material, NeoHooke
 
 __all__ = ["hand_laws"]
 
-_POISSON = (0.3, 0.49)  # of flesh, which keeps its volume; from .5 there is no bulk modulus
+_POISSON = (0.3, 0.49)  # accepted for flesh, which is nearly incompressible; at .5 the bulk modulus is infinite
 _CREASE = 1.0
-"""Fung's exponent between the bones of a joint."""
+"""Exponent of Fung's law between the bones of a joint."""
 
 
 def hand_laws(
@@ -25,26 +25,26 @@ def hand_laws(
     poisson: float = 0.48,
     stiffening: float = 3.0,
 ) -> dict[str, Material]:
-    """A law for every region of a hand's mesh, by the last part of its name.
+    """Constitutive law of every region of a hand's mesh, chosen by the last part of the region's name.
 
     Moduli after Maeno et al. 1998, quoted from memory: subcutaneous fat 34 kPa, dermis 80 kPa (epidermis 136 kPa),
-    ν = 0.48; bone 17 GPa. With them as moduli at small strain, Fung's law with β = 3 presses a fingertip on a plate as
-    people do: 1 N at 1.5 mm, then more than 3.5 N/mm (``examples/fingertip.py``). All laws are for large strain: flesh
-    turns with its finger, and a bone of a small-strain law would answer that rotation with enormous false reactions.
+    ν = 0.48; bone 17 GPa. With these as small-strain moduli, Fung's law with β = 3 gives the force of a fingertip on a
+    plate as measured on people: 1 N at 1.5 mm, then more than 3.5 N/mm (``examples/fingertip.py``). All laws are for
+    large strain: flesh rotates with its finger, and a small-strain bone would give large spurious reactions.
 
     Args:
-        mesh_regions: Region names, e.g. ``hand.flesh``, ``hand.skin``, ``hand.bone``; others are left out.
-            ``hand.skin:3/8`` is skin in three eighths of its volume, and flesh in the rest.
-        flesh: Young's modulus at small strain of what lies between skin and bone [Pa].
-        skin: The same of skin [Pa].
-        joint: Young's modulus of what lies between the bones of a joint [Pa]: soft, since there it stands for
-            cartilage that slides and skin that unfolds.
+        mesh_regions: Region names, such as ``hand.flesh``, ``hand.skin``, ``hand.bone``; unknown ones are skipped.
+            ``hand.skin:3/8`` consists of skin in three eighths of its volume, and of flesh in the rest.
+        flesh: Small-strain Young's modulus of the tissue between skin and bone [Pa].
+        skin: Small-strain Young's modulus of skin [Pa].
+        joint: Young's modulus between the bones of a joint [Pa]: low, since it stands for cartilage that slides and
+            skin that unfolds.
         bone: Young's modulus of bone [Pa].
         poisson: Poisson's ratio of flesh and skin.
-        stiffening: Exponent β of Fung's law; 0 is neo-Hookean.
+        stiffening: Exponent β of Fung's law; 0 gives the neo-Hookean law.
 
     Raises:
-        InputError: A ratio that no flesh has.
+        InputError: A Poisson's ratio out of range.
     """
     if not _POISSON[0] <= poisson <= _POISSON[1]:
         raise InputError(f"poisson: want {_POISSON[0]}…{_POISSON[1]} for flesh, got {poisson}")
@@ -59,7 +59,7 @@ def hand_laws(
         "pulp": flesh_law,
         "flesh": flesh_law,
         "skin": soft(skin, 1100.0),
-        # it has to stiffen a little all the same: neo-Hookean flesh buckles in the crease of a joint beyond 60°
+        # some stiffening is needed: neo-Hookean flesh buckles in the crease of a joint beyond 60°
         "joint": NeoHooke(joint, poisson, 1050.0) if stiffening == 0.0 else Fung(joint, _CREASE, poisson, 1050.0),
         "bone": NeoHooke(bone, 0.3, 1900.0),
     }
@@ -72,7 +72,7 @@ def hand_laws(
 
 
 def _mixed(one: Material, other: Material, share: float) -> Material:
-    """Two laws of a kind side by side, the second over a share of the volume: both are strained alike."""
+    """Mixture of two laws of a kind under equal strain, the second over a share of the volume."""
     constants = {
         key: (1.0 - share) * getattr(one, key) + share * getattr(other, key)
         for key in ("c10", "c01", "bulk", "density", "stiffening")

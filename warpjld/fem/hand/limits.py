@@ -1,4 +1,4 @@
-"""How hard each digit can press (R118): defaults, overridable."""
+"""Largest force of each digit (R118): defaults, and replacement of these."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Thumb: tip pinch, the lower end of the 69–103 N that pinch strength tables giv
 
 
 def force_limits(given: Mapping[str, float] | None = None) -> dict[str, float]:
-    """The defaults with some of them replaced.
+    """The defaults, with those in ``given`` replaced.
 
     Args:
         given: Digit → largest force [N].
 
     Raises:
-        InputError: No such digit, or no force above zero.
+        InputError: An unknown digit, or a force that is not positive and finite.
     """
     out = dict(FORCE_LIMITS)
     for digit, force in (given or {}).items():

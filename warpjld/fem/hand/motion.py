@@ -1,4 +1,4 @@
-"""A hand's bones over time: frames of poses, and everything between them (R110)."""
+"""Motion of a hand's bones over time, interpolated between poses (R110)."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["FleshMotion", "halfway", "motion_of"]
 
 @dataclass(frozen=True, eq=False)
 class FleshMotion:
-    """What drives a flesh hand: ``prescribed`` and ``guess`` are what the contact solver asks for.
+    """Motion of a flesh hand; ``prescribed`` and ``guess`` are called by the contact solver.
 
     Attributes:
         hand: The hand.
-        poses: Its poses, the first one of rest.
-        times: Their times, rising from 0, shape (F,).
+        poses: Its poses, the first one at rest.
+        times: Their times, increasing from 0, shape (F,).
     """
 
     hand: FleshHand
@@ -33,7 +33,7 @@ class FleshMotion:
     times: NDArray[np.float64]
 
     def pose(self, time: float) -> Poses:
-        """The pose at a time: joints turn evenly between frames, so bones keep their length."""
+        """The pose at a time; joint rotations are interpolated, so bones keep their length."""
         from scipy.spatial.transform import Rotation
 
         after = int(np.clip(np.searchsorted(self.times, time), 1, len(self.times) - 1))
@@ -62,7 +62,7 @@ class FleshMotion:
         return Poses(positions, rotations, flexion[None])
 
     def moves(self, time: float) -> Moves:
-        """Motions of the bones from rest at a time."""
+        """Rigid motions of the bones from rest at a time."""
         return self.hand.moves(self.pose(time))
 
     def prescribed(self, time: float) -> Prescribed:
@@ -70,12 +70,12 @@ class FleshMotion:
         return self.hand.prescribed_by(self.moves(time))
 
     def guess(self, before: float, time: float, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """First guess of the displacement at ``time`` from that at ``before`` [m], shape (N, 3)."""
+        """Initial guess of the displacement at ``time`` from that at ``before`` [m], shape (N, 3)."""
         return self.hand.guess(self.moves(before), self.moves(time), displacement)
 
     @cached_property
     def _locals(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Rotation and place of every joint relative to its parent, shapes (F, J, 4) and (F, J, 3)."""
+        """Rotation and position of every joint relative to its parent, shapes (F, J, 4) and (F, J, 3)."""
         from scipy.spatial.transform import Rotation
 
         turns, offsets = self.poses.rotations.copy(), self.poses.positions.copy()
@@ -88,15 +88,15 @@ class FleshMotion:
 
 
 def motion_of(hand: FleshHand, poses: Poses, times: Sequence[float] | None = None) -> FleshMotion:
-    """Drive a hand from rest through poses.
+    """The motion of a hand from rest through poses.
 
     Args:
         hand: The hand; ``hand.placed(poses)`` where the first pose is far from rest.
-        poses: F poses of its skeleton (as given to the covering, not moved).
-        times: Their times, rising and above 0, by default 1, 2, …, F. At time 0 the hand is at rest.
+        poses: F poses of its skeleton (as for the covering, not moved).
+        times: Their times, increasing and above 0; 1, 2, …, F by default. At time 0 the hand is at rest.
 
     Raises:
-        InputError: Times that do not rise, or not as many as poses.
+        InputError: Times that do not increase, or are not as many as poses.
     """
     at = np.arange(1.0, len(poses) + 1.0) if times is None else np.asarray(times, dtype=np.float64)
     if at.shape != (len(poses),) or len(at) == 0 or not (np.diff(np.concatenate([[0.0], at])) > 0.0).all():
@@ -114,7 +114,7 @@ def motion_of(hand: FleshHand, poses: Poses, times: Sequence[float] | None = Non
 
 
 def halfway(hand: FleshHand, before: Poses, after: Poses) -> Poses:
-    """The pose between two: joints turned half of the way, bones as long as they are."""
+    """The pose half-way between two, with interpolated joint rotations."""
     both = Poses(
         np.concatenate([before.positions, after.positions]),
         np.concatenate([before.rotations, after.rotations]),

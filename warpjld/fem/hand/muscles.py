@@ -1,12 +1,12 @@
-"""What muscles have to do, and whether they can (R118, R119).
+"""Efforts of muscles, and comparison with their limits (R118, R119).
 
-**Load of a bone**: minus the reactions that hold its nodes, less those of the hand's flesh alone in the same pose.
-**Force of a digit**: length of the sum of the forces on its phalanges, the bones beyond its base joint.
-**Torque of a joint**: moment about the joint of the forces on all bones beyond it, along its flexion axis as posed;
-positive where the load opens the digit and its flexors have to work.
-**Limits**: a digit's force limit F is measured pressing with the pad; its joints then bear F times the distance from
+**Load of a bone**: negative reactions at its nodes, minus those of the flesh without contact in the same pose.
+**Force of a digit**: length of the sum of the loads on its phalanges, the bones beyond its base joint.
+**Torque of a joint**: moment about the joint of the loads on all bones beyond it, along its flexion axis in the pose;
+positive where the load extends the digit and its flexors have to work.
+**Limits**: a digit's force limit F is measured with the pad pressing; its joints then bear F times the distance from
 the joint to the middle of the last phalanx at rest, and that product is the joint's torque limit.
-**Share**: the largest of force over limit and torques over their limits; above 1 muscles cannot hold the pose.
+**Share**: the largest ratio of force or torques to their limits; above 1 muscles cannot hold the pose.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["JOINT_WORDS", "KNUCKLES", "DigitEffort", "Effort", "effort_of"]
 
 KNUCKLES = ("base", "knuckle2", "knuckle3")
-"""The three joints of a digit, from its base on."""
+"""The three joints of a digit, base first."""
 JOINT_WORDS = ("base", "knuckle 2", "knuckle 3")
-"""What the three joints of a digit are called in texts."""
+"""Names of the three joints of a digit in texts."""
 
 
 @dataclass(frozen=True, eq=False)
 class DigitEffort:
-    """What one digit's muscles have to do.
+    """Effort of one digit's muscles.
 
     Attributes:
         digit: ``index``, or ``left.index`` where the skeleton has sides.
         load: Sum of the forces on its phalanges [N], shape (3,).
         torques: Of base, knuckle 2 and knuckle 3 [N m], positive where flexors work, shape (3,).
         limit: Largest force [N].
-        torque_limits: [N m], shape (3,).
-        flesh: Length of the sum of what flesh alone, its weight and the strain of bent joints, puts on its phalanges in
-            that pose [N]: not in ``load``; NaN where it is not known.
+        torque_limits: Largest torques [N m], shape (3,).
+        flesh: Length of the sum of the loads of the flesh without contact (its weight and the strain of bent joints) on
+            the phalanges in that pose [N]; not included in ``load``; NaN if unknown.
     """
 
     digit: str
@@ -60,7 +60,7 @@ class DigitEffort:
 
     @property
     def shares(self) -> NDArray[np.float64]:
-        """Force, then base, knuckle 2, knuckle 3, over their limits, shape (4,)."""
+        """Force, then torques of base, knuckle 2 and knuckle 3, per limit, shape (4,)."""
         return np.concatenate([[self.force / self.limit], np.abs(self.torques) / self.torque_limits])
 
     @property
@@ -70,17 +70,17 @@ class DigitEffort:
 
     @property
     def bound(self) -> str:
-        """What ``share`` is about: ``force``, ``base``, ``knuckle 2`` or ``knuckle 3``."""
+        """Quantity with the largest share: ``force``, ``base``, ``knuckle 2`` or ``knuckle 3``."""
         return ("force", *JOINT_WORDS)[int(self.shares.argmax())]
 
     @property
     def levers(self) -> NDArray[np.float64]:
-        """Torque per force of each joint [m]: how far the digit's load moves per radian of that joint, shape (3,)."""
+        """Lever arm of each joint, torque per force [m], shape (3,)."""
         return self.torques / max(self.force, 1e-12)
 
     @property
     def text(self) -> str:
-        """``index 41 N of 59 N``, with the joint that comes nearer to its limit where one does."""
+        """``index 41 N of 59 N``, with the joint of the largest share if that is above 1 and exceeds the force's."""
         out = f"{self.digit} {self.force:.3g} N of {self.limit:.3g} N"
         joint = int(self.shares.argmax()) - 1
         if joint >= 0 and self.share > 1.0:
@@ -90,11 +90,11 @@ class DigitEffort:
 
 @dataclass(frozen=True, eq=False)
 class Effort:
-    """What every digit's muscles have to do at one instant.
+    """Efforts of all digits' muscles at one instant.
 
     Attributes:
         digits: Those of the skeleton.
-        palm: Sum of the forces on all other bones [N], shape (3,).
+        palm: Sum of the loads on all other bones [N], shape (3,).
     """
 
     digits: tuple[DigitEffort, ...]
@@ -118,7 +118,7 @@ class Effort:
 
     @property
     def text(self) -> str:
-        """One line: what is too much, or what comes nearest to its limit."""
+        """One line: what exceeds its limit, or what is closest to it."""
         over = [d for d in self.digits if d.share > 1.0]
         if over:
             return "more than muscles can do: " + "; ".join(d.text for d in over)
@@ -126,7 +126,7 @@ class Effort:
         return f"within what muscles can do; most: {most.text} ({100.0 * most.share:.0f} %)"
 
     def stop(self) -> str | None:
-        """A text where muscles cannot do it, otherwise None: what the contact solver's ``watch`` returns."""
+        """The text if muscles cannot hold the pose, otherwise None, as the contact solver's ``watch`` returns."""
         return None if self.realistic else self.text
 
 
@@ -138,15 +138,15 @@ def effort_of(
     limits: Mapping[str, float] | None = None,
     flesh: BoneLoads | None = None,
 ) -> Effort:
-    """Compare the loads on bones with what muscles can do.
+    """Compare the loads on bones with the muscles' limits.
 
     Args:
-        skeleton: The rest skeleton, which gives axes and levers.
-        poses: Where its joints are.
+        skeleton: The rest skeleton, which gives axes and lever arms.
+        poses: Positions and rotations of its joints.
         loads: Force and moment on each bone.
         frame: Frame of the poses.
-        limits: Digit → largest force [N], where it is not the default.
-        flesh: What the flesh alone puts on each bone: reported, not counted.
+        limits: Digit → largest force [N], where it differs from the default.
+        flesh: Loads of the flesh without contact: reported only.
 
     Raises:
         InputError: A skeleton without digits, or wrong limits.
@@ -170,7 +170,7 @@ def effort_of(
             if k == 0:
                 load = force
             about = moment - np.cross(poses.positions[frame, joint], force)
-            # the axis turns with the bone before the joint, which this joint's flexion does not move
+            # the axis rotates with the parent bone, which this joint's flexion does not move
             before = int(skeleton.parents[joint])
             axis = Rotation.from_quat(poses.rotations[frame, max(before, 0)]).apply(skeleton.axes[joint])
             torques[k] = -float(about @ axis)
@@ -184,7 +184,7 @@ def effort_of(
 
 
 def _chains(skeleton: Skeleton) -> dict[str, tuple[tuple[int, int, int], int]]:
-    """Digits of a skeleton: their three joints, and their tip."""
+    """Digits of a skeleton, each with its three flexion joints and its tip."""
     found = {}
     for side in ("left.", "right.", ""):
         for digit in DIGITS:

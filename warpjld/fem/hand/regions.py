@@ -1,4 +1,4 @@
-"""What every element of a hand is made of: skin, flesh, bone, or what lies between the bones of a joint (R105)."""
+"""Material region of every element of a hand: skin, flesh, bone, or tissue between the bones of a joint (R105)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["hand_regions", "shares_of_skin"]
 
 _CARPAL = ("wrist", "forearm")
 _SHARED = 0.1
-"""Share of both bones from which on flesh between them has to stretch with their joint."""
+"""Smallest weight of both bones at which an element between them belongs to their joint."""
 _PARTS = 8
-"""Shares of skin in an element are rounded to one in so many."""
+"""Shares of skin in an element are rounded to multiples of one over this number."""
 _ACROSS = 5
-"""Points along each edge of an element at which it is asked whether it is skin."""
+"""Sample points along each edge of an element for its share of skin."""
 
 
 def hand_regions(
@@ -36,19 +36,19 @@ def hand_regions(
 ) -> tuple[NDArray[np.int32], tuple[str, ...]]:
     """Region of each element, shape (E,), and the regions' names.
 
-    They are ``hand.flesh``, ``hand.skin``, ``hand.joint`` (flesh and skin between the bones of a joint, and where
-    digits part) and ``hand.bone``. Skin is as thick as it is, however large the elements: one that it fills to three
+    These are ``hand.flesh``, ``hand.skin``, ``hand.joint`` (flesh and skin between the bones of a joint, and between
+    digits) and ``hand.bone``. The thickness of skin does not depend on the size of elements: one that it fills to three
     eighths belongs to ``hand.skin:3/8``.
 
     Args:
-        mesh: Regions ``flesh`` and ``bone``.
-        name: What the names begin with.
-        surface: The skin that is seen.
-        skin: Its depth [m].
-        weights: Share of each bone in every node, shape (N, B).
-        joints: Name of the joint at the far end of each bone.
-        bones: These joints, in the skeleton's numbering.
-        parents: Those at the near ends.
+        mesh: Mesh with regions ``flesh`` and ``bone``.
+        name: Prefix of the region names.
+        surface: The surface of the skin.
+        skin: Thickness of the skin [m].
+        weights: Weight of each bone at every node, shape (N, B).
+        joints: Name of the distal joint of each bone.
+        bones: Indices of these joints in the skeleton.
+        parents: Indices of the proximal joints.
     """
     parts = np.rint(_PARTS * shares_of_skin(mesh, Envelope(surface.vertices, surface.faces), skin)).astype(np.int32)
     out = np.where(_between(mesh, weights, joints, bones, parents), _PARTS + 1, parts)
@@ -60,15 +60,15 @@ def hand_regions(
 
 
 def shares_of_skin(mesh: HexMesh, envelope: Envelope, skin: float) -> NDArray[np.float64]:
-    """Share of each element that lies nearer to a surface than the skin is deep [m], shape (E,)."""
+    """Share of each element's volume within the skin's thickness [m] of a surface, shape (E,)."""
     depth = -envelope.ask(mesh.nodes).distance[mesh.elements]
     out = (depth.max(axis=1) < skin).astype(np.float64)
-    some = np.flatnonzero((depth.min(axis=1) < skin) & (depth.max(axis=1) >= skin))
+    partial = np.flatnonzero((depth.min(axis=1) < skin) & (depth.max(axis=1) >= skin))
     places = (np.arange(_ACROSS) + 0.5) / _ACROSS
     u, v, w = (grid.ravel() for grid in np.meshgrid(places, places, places, indexing="ij"))
     square = [(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v]
     shape = np.stack([*(corner * (1 - w) for corner in square), *(corner * w for corner in square)])
-    out[some] = (depth[some] @ shape < skin).mean(axis=1)
+    out[partial] = (depth[partial] @ shape < skin).mean(axis=1)
     return out
 
 
@@ -79,9 +79,9 @@ def _between(
     bones: Sequence[int],
     parents: Sequence[int],
 ) -> NDArray[np.bool_]:
-    """Elements of flesh shared by two bones that meet at a joint, or by two digits where they part.
+    """Mask of flesh elements shared by two bones that meet at a joint, or by two digits where they separate.
 
-    The wrist's own joints hardly move but for the thumb's: the palm keeps its flesh.
+    Joints of the wrist, except for the thumb's, hardly move and are excluded.
     """
     share = weights[mesh.elements].mean(axis=1)
     out = np.zeros(len(mesh.elements), dtype=bool)

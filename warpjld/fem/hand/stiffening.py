@@ -1,8 +1,8 @@
-"""How far to go for a force, where it stiffens: from the force and its slope at one place, or at two.
+"""Extrapolation of the displacement at which a stiffening force reaches a value, from one or two known states.
 
-F / F′ =: L is the way in which a force would grow by a factor e. It says how the force stiffens: constant where it
-grows exponentially, as flesh does between bone and plate; in proportion to the way since the first touch, over n, where
-it grows with a power n of it (springs 1, Hertz 1.5, thin pads 2).
+F / F′ =: L is the displacement over which the force would grow by a factor e. Its change characterises the stiffening:
+L is constant for an exponential force, as of flesh between bone and plate; it is the displacement since first contact
+over n for a force that grows with its power n (springs 1, Hertz 1.5, thin pads 2).
 """
 
 from __future__ import annotations
@@ -12,32 +12,32 @@ from dataclasses import dataclass
 
 __all__ = ["ForceSlope", "way_to"]
 
-_POWERS = (1.0, 30.0)  # exponents allowed, from linear to a wall
+_POWERS = (1.0, 30.0)  # range of exponents, from linear to nearly rigid
 _STIFFEST = 0.3
-"""Least L, over the present one, that two places may foretell."""
+"""Smallest extrapolated L, per present L."""
 
 
 @dataclass(frozen=True)
 class ForceSlope:
-    """A force, and its derivative by the way; both above 0."""
+    """A force, and its derivative with respect to displacement; both above 0."""
 
     force: float
     slope: float
 
     @property
     def way(self) -> float:
-        """L."""
+        """L, force over slope."""
         return self.force / self.slope
 
 
 def way_to(force: float, now: ForceSlope, other: ForceSlope | None = None, power: float = math.inf) -> float:
-    """How much farther it is to a force, negative where it is less than the present one.
+    """Displacement from the present force to a wanted one, negative if that is smaller.
 
     Args:
-        force: Wished, above 0.
-        now: Where it begins.
-        other: Another place, to tell how the force stiffens.
-        power: n where there is none, or it does not tell; infinite: exponentially.
+        force: Wanted force, above 0.
+        now: Present state.
+        other: Another state, to estimate the stiffening.
+        power: Exponent n if there is no other state, or it is not conclusive; infinite for exponential growth.
     """
     grows = math.log(force / now.force)
     if other is not None:

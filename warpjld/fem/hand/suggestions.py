@@ -1,7 +1,7 @@
-"""Words and numbers for the animator: how far to open which joint for which force (R119).
+"""Suggestions to the animator which joint to open, and by how much, to reduce a force (R119).
 
-How a digit's force follows each of its joints, the equilibrium's tangent says (``contact.sensitivity``); how it
-stiffens on the way, two instants of one press (``stiffening``).
+Derivatives of a digit's force by its joint angles come from the equilibrium's tangent (``contact.sensitivity``), the
+stiffening from two instants of one press (``stiffening``).
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["DigitSlopes", "Suggestion", "suggestions"]
 
 _LEAST = 1e-3
-"""Slope over the largest of a digit's joints, below which a joint is no use."""
+"""Slope, per largest slope of the digit's joints, below which a joint is not suggested."""
 
 
 @dataclass(frozen=True, eq=False)
 class DigitSlopes:
-    """A digit's force at an instant, and how it follows its joints.
+    """A digit's force at an instant, and its derivatives by joint angles.
 
     Attributes:
-        force: [N]
-        slopes: Its derivatives by the flexion of base, knuckle 2 and knuckle 3 [N/rad], shape (3,).
+        force: The force [N].
+        slopes: Derivatives by the flexion of base, knuckle 2 and knuckle 3 [N/rad], shape (3,).
     """
 
     force: float
@@ -39,12 +39,12 @@ class DigitSlopes:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """One joint to turn.
+    """Suggested change of one joint.
 
     Attributes:
         digit: The digit.
         joint: ``base``, ``knuckle 2`` or ``knuckle 3``.
-        opening: How far to open it [rad].
+        opening: Angle to open it by [rad].
         wanted: Force after that [N].
         text: ``index 41 N of 59 N; open knuckle 2 by 3.2° for 30 N``.
     """
@@ -66,17 +66,17 @@ def suggestions(
     aim: float = 0.5,
     above: float = 1.0,
 ) -> tuple[Suggestion, ...]:
-    """What to open, for every digit whose share is above a bound.
+    """Suggestions for every digit whose share is above a bound.
 
-    The joint is the one that needs to turn least and may.
+    The joint is the one that has to turn least and is able to.
 
     Args:
         skeleton: Names and limits of the joints.
-        now: The effort.
+        now: The present effort.
         angles: Joint angles [rad], shape (J, 4).
-        slopes: How the digits' forces follow their joints, where it is known.
-        before: The same at an earlier instant of the press, where there is one.
-        aim: Share that is wanted.
+        slopes: Derivatives of the digits' forces, if known.
+        before: The same at an earlier instant of the press, if there is one.
+        aim: Wanted share.
         above: Share above which something is suggested.
     """
     out = []
@@ -103,7 +103,7 @@ def suggestions(
 
 
 def _opening(before: DigitSlopes | None, now: DigitSlopes, joint: int, wanted: float) -> float:
-    """How far a joint opens for a wanted force [rad]; infinite where that is no use."""
+    """Angle by which a joint has to open for a wanted force [rad]; infinite if the joint has hardly any effect."""
     slope = float(now.slopes[joint])
     if not slope > _LEAST * float(now.slopes.max()):
         return math.inf

@@ -1,4 +1,4 @@
-"""How much each bone carries of every node at rest: the smooth field a first guess is blended with."""
+"""Smooth weights of the bones at all nodes of a hand's mesh, for blended motions of the flesh."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ __all__ = ["bone_weights"]
 
 
 def bone_weights(mesh: HexMesh, bones: Sequence[NDArray[np.int32]]) -> NDArray[np.float64]:
-    """Harmonic weights: one on a bone's own nodes, falling smoothly to zero on the others', shape (N, bones).
+    """Harmonic weights: one at a bone's own nodes, falling smoothly to zero at those of others, shape (N, bones).
 
-    Solves L w = 0 between the bones, L the Laplacian of the mesh's edges weighted by 1 / length: an M-matrix, so
-    weights lie in 0…1 and rows sum to one. Flesh beside a finger is not reached through the air, only through flesh.
+    Solves L w = 0 between the bones, L the graph Laplacian of the mesh's edges with weights 1 / length: an M-matrix, so
+    weights lie in 0…1 and rows sum to one. Distances are through flesh, not through the air between fingers.
 
     Args:
-        mesh: At rest.
+        mesh: Mesh at rest.
         bones: Nodes of each bone.
     """
     from scipy.sparse import coo_array, diags_array

@@ -1,4 +1,4 @@
-"""Body forces, surface forces and concentrated forces as nodal forces (B eqs. 1–4, R97)."""
+"""Body forces, surface loads and point loads as equivalent nodal forces (B eqs. 1–4, R97)."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _QUAD = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
 
 @dataclass(frozen=True)
 class Centrifugal:
-    """A body turning steadily: each element is driven outwards by ρ ω² × its distance from the axis.
+    """Steady rotation of a body: each element is driven outwards by ρ ω² × its distance from the axis.
 
     Attributes:
-        axis: Direction of the axis, any length but zero.
+        axis: Direction of the axis, of any length above zero.
         point: A point on it [m].
         speed: Angular speed [rad/s].
         region: Region of the mesh that turns; all of it if left out.
@@ -39,16 +39,16 @@ class Centrifugal:
 
 @dataclass(frozen=True)
 class Loads:
-    """Everything that pushes on a body, at full strength; load instants scale it (R99).
+    """All loads on a body at full strength; load increments scale them (R99).
 
     Attributes:
         gravity: Acceleration [m/s²].
-        centrifugal: A steady turn, several of different regions, or None.
-        pressure: Pressure on named faces [Pa], against their outward normal; it follows the deformed surface where the
-            law is for large strain.
+        centrifugal: A steady rotation, several of different regions, or None.
+        pressure: Pressure on named faces [Pa], against their outward normal; a follower load, normal to the deformed
+            surface, for large-strain laws.
         traction: Force per rest area on named faces [Pa], of constant direction.
-        forces: Concentrated force [N], shared equally by the nodes of a set.
-        nodal: Concentrated force on every node [N], shape (N, 3), or None.
+        forces: Point load [N], distributed equally over the nodes of a set.
+        nodal: Nodal forces [N], shape (N, 3), or None.
     """
 
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -70,7 +70,7 @@ class Loads:
         return turn if isinstance(turn, tuple) else () if turn is None else (turn,)
 
     def scaled(self, share: float) -> Loads:
-        """A share of the loads: forces in proportion, and a slower turn."""
+        """A share of the loads; the rotation is slowed down such that its forces are scaled, too."""
         slower = tuple(replace(turn, speed=turn.speed * float(np.sqrt(share))) for turn in self.turns)
         return Loads(
             gravity=_scaled(self.gravity, share),
@@ -83,10 +83,10 @@ class Loads:
 
 
 def external_forces(body: Body, loads: Loads, displacement: Array | None = None) -> Array:
-    """Nodal forces of the loads [N], shape (3N,); pressure and centrifugal force as the displaced body meets them.
+    """Nodal forces of the loads [N], shape (3N,); pressure and centrifugal force in the displaced configuration.
 
     Raises:
-        InputError: A load on faces or nodes the mesh lacks, or that is not finite.
+        InputError: A load on unknown faces or nodes, or one that is not finite.
     """
     mesh = body.mesh
     now = mesh.nodes if displacement is None else mesh.nodes + displacement.reshape(-1, 3)
@@ -140,9 +140,9 @@ def _add_turn(out: Array, mesh: HexMesh, weight: Array, turn: Centrifugal, now: 
 def subtract_pressure_stiffness(
     stiffness: BlockMatrix, body: Body, loads: Loads, displacement: Array, factor: float = 1.0
 ) -> None:
-    """Subtract what following pressure adds to the stiffness, in place, symmetric part.
+    """Subtract the load stiffness of follower pressure, its symmetric part, in place.
 
-    Over a closed surface, or one whose rim is held, the skew parts of neighbouring faces cancel: nothing is lost.
+    Over a closed surface, or one with a fixed rim, skew parts of neighbouring faces cancel, so that nothing is lost.
     """
     mesh = body.mesh
     now = mesh.nodes + displacement.reshape(-1, 3)
@@ -163,14 +163,14 @@ def subtract_pressure_stiffness(
 
 
 def volumes(mesh: HexMesh) -> Array:
-    """Rest volume at each of the eight integration points [m³], shape (E, 8)."""
+    """Rest volume of each of the eight integration points [m³], shape (E, 8)."""
     jacobian = np.einsum("eai,qaj->eqij", mesh.nodes[mesh.elements], slope_at(POINTS))
     out: Array = np.linalg.det(jacobian)
     return out
 
 
 def _quad_points() -> list[tuple[Array, Array, Array]]:
-    """Shape functions and their two derivatives at the 2 × 2 points of a face."""
+    """Shape functions and their two derivatives at the 2 × 2 Gauss points of a face."""
     out = []
     for s, t in _QUAD / np.sqrt(3.0):
         u, v = 1.0 + _QUAD[:, 0] * s, 1.0 + _QUAD[:, 1] * t

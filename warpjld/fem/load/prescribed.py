@@ -1,4 +1,4 @@
-"""Prescribed displacements, the partition they make, and bodies they leave free (B eqs. 6–8, R107, R110, R128)."""
+"""Dirichlet conditions, the partition they define, and free rigid motions (B eqs. 6–8, R107, R110, R128)."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ __all__ = [
 ]
 
 _MOTIONS = (
-    "moving along x",
-    "moving along y",
-    "moving along z",
-    "turning about x",
-    "turning about y",
-    "turning about z",
+    "translation along x",
+    "translation along y",
+    "translation along z",
+    "rotation about x",
+    "rotation about y",
+    "rotation about z",
 )
 
 
 class FreeBodyError(InputError):
-    """A body can move without deforming: a static solve would be singular."""
+    """A body can move without deforming: a static problem would be singular."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """Displacements U_k that are known, degree of freedom by degree of freedom: one, two or three of a node.
+    """Known displacements U_k by degree of freedom: one, two or three per node.
 
     Attributes:
         degrees: Degrees of freedom, 3 × node + axis, ascending, shape (n,).
@@ -71,17 +71,17 @@ class Prescribed:
         return Prescribed(both[first], kept)
 
     def scaled(self, factor: float) -> Prescribed:
-        """The same degrees of freedom, displaced by ``factor`` times as much: a load instant (R99)."""
+        """The same degrees of freedom with displacements times ``factor``, for a load increment (R99)."""
         return Prescribed(self.degrees, factor * self.values)
 
     def free(self, count: int) -> Mask:
-        """Mask of the free ones of ``count`` degrees of freedom."""
+        """Mask of free degrees of freedom, shape (count,)."""
         mask = np.ones(count, dtype=bool)
         mask[self.degrees] = False
         return mask
 
     def full(self, count: int) -> Array:
-        """A displacement vector that holds U_k, and zero elsewhere, shape (count,)."""
+        """A displacement vector that contains U_k, and zeros elsewhere, shape (count,)."""
         out = np.zeros(count)
         out[self.degrees] = self.values
         return out
@@ -102,10 +102,10 @@ def prescribe(
         mesh: The mesh.
         where: Name of a node set, face set or region, or node numbers.
         x: Displacement along x [m], or None to leave it free; ``y``, ``z`` alike.
-        displacement: All three components [m], shape (3,) or one row a node, shape (n, 3); NaN leaves one free.
+        displacement: All three components [m], shape (3,) or one row per node, shape (n, 3); NaN leaves one free.
 
     Raises:
-        InputError: No such set, a node out of range, or nothing prescribed.
+        InputError: Unknown set, node out of range, or nothing prescribed.
     """
     nodes = mesh.node_set(where) if isinstance(where, str) else np.atleast_1d(np.asarray(where, dtype=np.int64))
     if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(mesh.nodes)):
@@ -126,7 +126,7 @@ def prescribe(
 
 
 def components(body: Body) -> Ints32:
-    """Connected piece each node belongs to, shape (N,)."""
+    """Connected component of each node, shape (N,)."""
     p = body.pattern
     n = len(p.rows) - 1
     graph = csr_array((np.ones(len(p.columns), np.int8), p.columns, p.rows), shape=(n, n))
@@ -134,7 +134,7 @@ def components(body: Body) -> Ints32:
 
 
 def free_motions(body: Body, prescribed: Prescribed) -> list[tuple[Ints, Array]]:
-    """Pieces that can move as a whole: their nodes, and the rigid motions left (6, k), for each such piece."""
+    """Components with free rigid motions: nodes, and a basis (6, k) of the free motions, for each."""
     piece = components(body)
     found = []
     held_piece = piece[prescribed.degrees // 3]
@@ -156,7 +156,7 @@ def free_motions(body: Body, prescribed: Prescribed) -> list[tuple[Ints, Array]]
 
 
 def rigid_modes(nodes: Array) -> Array:
-    """The six rigid motions of points, rotations about their centre and scaled to their size, shape (3n, 6)."""
+    """The six rigid motions of points, rotations about their centre scaled to unit displacement, shape (3n, 6)."""
     centred = nodes - nodes.mean(axis=0)
     reach = float(np.abs(centred).max()) or 1.0
     x, y, z = (centred / reach).T
@@ -169,10 +169,10 @@ def rigid_modes(nodes: Array) -> Array:
 
 
 def refuse_free(body: Body, prescribed: Prescribed) -> None:
-    """Refuse bodies that can move as a whole.
+    """Reject bodies with free rigid motions.
 
     Raises:
-        FreeBodyError: Names the piece, its region and its free motions.
+        FreeBodyError: Names the component, its regions and its free motions.
     """
     found = free_motions(body, prescribed)
     if not found:
@@ -182,18 +182,18 @@ def refuse_free(body: Body, prescribed: Prescribed) -> None:
     regions = [body.mesh.region_names[r] for r in np.unique(body.mesh.regions[inside])]
     free = [_MOTIONS[k] for k in range(6) if np.abs(left[k]).max() > 0.3]
     raise FreeBodyError(
-        f"the body of {len(nodes)} nodes ({', '.join(regions)}) is not held: free in {', '.join(free)}"
+        f"the body of {len(nodes)} nodes ({', '.join(regions)}) is not constrained: free are {', '.join(free)}"
         + (f" (and {len(found) - 1} more bodies)" if len(found) > 1 else "")
         + ". Prescribe displacements, or hold free bodies with free='hold'"
     )
 
 
 def held_in_place(body: Body, prescribed: Prescribed) -> Prescribed:
-    """Hold free bodies by as few degrees of freedom as it takes, at most six each, at zero displacement.
+    """Constrain free rigid motions by the minimal number of degrees of freedom, at zero displacement.
 
-    The rule: of all degrees of freedom of the piece, those are taken in turn that stop most of the motion still free
-    (pivoted QR of the rigid motions). Under loads in equilibrium their reactions are zero and the choice changes the
-    solution by a rigid motion only; otherwise their reactions show what is missing.
+    Degrees of freedom are chosen one by one such that each stops most of the remaining free motion (QR of the rigid
+    motions with pivoting). Under loads in equilibrium their reactions are zero, and the choice changes the solution by
+    a rigid motion only; otherwise their reactions show the imbalance.
     """
     for nodes, left in free_motions(body, prescribed):
         rows = rigid_modes(body.mesh.nodes[nodes]) @ left

@@ -14,22 +14,22 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["Fung", "LinearElastic", "Material", "MaterialWarning", "MooneyRivlin", "NeoHooke", "laws_of"]
 
-_USUAL_POISSON = 0.49  # above it a warning
+_USUAL_POISSON = 0.49  # larger values cause a warning
 LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN, FUNG, NEO_HOOKE_FULL = range(6)
 
 
 class MaterialWarning(UserWarning):
-    """A material that is usable, but costs accuracy or time."""
+    """A usable material that costs accuracy or time."""
 
 
 @dataclass(frozen=True)
 class Material:
-    """What an element needs to know.
+    """Constitutive law of an element.
 
     Attributes:
-        kind: Law, as ``warpjld_kernels.fem_laws`` numbers them.
-        c10: Half the shear modulus, or Mooney and Rivlin's first constant [Pa].
-        c01: Mooney and Rivlin's second constant [Pa].
+        kind: Law, as numbered in ``warpjld_kernels.fem_laws``.
+        c10: Half the shear modulus, or first Mooney–Rivlin constant [Pa].
+        c01: Second Mooney–Rivlin constant [Pa].
         bulk: Bulk modulus [Pa].
         density: Mass per rest volume [kg/m³].
         stiffening: Fung's exponent β.
@@ -44,7 +44,7 @@ class Material:
 
     @property
     def large_strain(self) -> bool:
-        """Whether the law needs Newton's method."""
+        """Whether the law is for large strain, which needs Newton's method."""
         return self.kind >= NEO_HOOKE
 
     @property
@@ -64,7 +64,7 @@ class Material:
 
 
 def LinearElastic(young: float, poisson: float, density: float = 1000.0, *, mean_dilatation: bool = True) -> Material:
-    """Hooke's law at small strain, with the B-bar element unless ``mean_dilatation`` is off (it then locks near ν = ½).
+    """Hooke's law at small strain, with B-bar elements; without ``mean_dilatation`` elements lock near ν = ½.
 
     Args:
         young: Young's modulus [Pa].
@@ -73,7 +73,7 @@ def LinearElastic(young: float, poisson: float, density: float = 1000.0, *, mean
         mean_dilatation: One pressure per element (B-bar).
 
     Raises:
-        InputError: A modulus, ratio or density that no material has.
+        InputError: A modulus, ratio or density out of range.
     """
     shear, bulk = _moduli(young, poisson, density)
     return Material(LINEAR if mean_dilatation else LINEAR_FULL, 0.5 * shear, 0.0, bulk, density)
@@ -82,7 +82,7 @@ def LinearElastic(young: float, poisson: float, density: float = 1000.0, *, mean
 def NeoHooke(young: float, poisson: float, density: float = 1000.0, *, mean_dilatation: bool = True) -> Material:
     """W = μ/2 (Ī₁ − 3) + κ/2 (θ − 1)², θ the element's mean volume ratio: rubber and flesh at large strain.
 
-    Without ``mean_dilatation`` θ is each point's own, as in programs with plain 8-node elements: it locks near ν = ½.
+    Without ``mean_dilatation`` θ is that of each integration point, as in plain 8-node elements: these lock near ν = ½.
 
     Args:
         young: Young's modulus at small strain [Pa].
@@ -91,7 +91,7 @@ def NeoHooke(young: float, poisson: float, density: float = 1000.0, *, mean_dila
         mean_dilatation: One volume ratio, and so one pressure, per element.
 
     Raises:
-        InputError: A modulus, ratio or density that no material has.
+        InputError: A modulus, ratio or density out of range.
     """
     shear, bulk = _moduli(young, poisson, density)
     return Material(NEO_HOOKE if mean_dilatation else NEO_HOOKE_FULL, 0.5 * shear, 0.0, bulk, density)
@@ -107,7 +107,7 @@ def MooneyRivlin(c10: float, c01: float, poisson: float = 0.49, density: float =
         density: [kg/m³].
 
     Raises:
-        InputError: Constants that no material has.
+        InputError: Constants out of range.
     """
     if not c01 >= 0.0:
         raise InputError(f"c01: want a constant ≥ 0 Pa, got {c01}")
@@ -123,12 +123,12 @@ def Fung(young: float, stiffening: float, poisson: float = 0.48, density: float 
 
     Args:
         young: Young's modulus at small strain [Pa].
-        stiffening: β > 0; the modulus has grown by e where Ī₁ − 3 = 1 / β (a stretch of 1.6 for β = 1, 1.2 for β = 10).
+        stiffening: β > 0; the modulus is e times as large where Ī₁ − 3 = 1 / β (stretch 1.6 for β = 1, 1.2 for β = 10).
         poisson: Poisson's ratio at small strain.
         density: [kg/m³].
 
     Raises:
-        InputError: A modulus, exponent, ratio or density that no material has.
+        InputError: A modulus, exponent, ratio or density out of range.
     """
     if not 0.0 < stiffening <= 100.0:
         raise InputError(f"stiffening: want an exponent above 0, at most 100, got {stiffening}")
@@ -160,7 +160,7 @@ def laws_of(mesh: HexMesh, materials: Material | Mapping[str, Material]) -> tupl
         materials: One law, or one per region name.
 
     Raises:
-        InputError: A region without a law, or a law for a region the mesh lacks.
+        InputError: A region without a law, or a law for an unknown region.
     """
     if isinstance(materials, Material):
         materials = dict.fromkeys(mesh.region_names, materials)

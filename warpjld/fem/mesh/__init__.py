@@ -1,1 +1,1 @@
-"""Meshes of 8-node hexahedra: generated, fitted into surfaces, read from files, and what they carry."""
+"""Meshes of 8-node hexahedra: generated, fitted to surfaces, or read from files; embedded surfaces."""

@@ -1,8 +1,8 @@
-"""Bones in a mesh: which elements they take, and nodes moved onto their surfaces.
+"""Bones in a mesh: selection of their elements, and fitting of nodes to their surfaces.
 
-Elements of a regular grid make stairs of a bone: the flesh over it is too thin here and too thick there, by up to half
-an element, and where only two or three elements lie between bone and skin its forces are wrong by as much. So nodes
-between bone and flesh are moved to the bone's surface, as those of the skin are to the skin's.
+Elements of a regular grid approximate a bone by stairs: the depth of the flesh over it is wrong by up to half an
+element, and so are its forces where only two or three elements lie between bone and skin. So nodes between bone and
+flesh are moved to the bone's surface, as those of the skin are to the skin's.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from warpjld.fem.mesh.untangle import as_far, improve
 __all__ = ["Bone", "claimed", "fitted"]
 
 _PULLS = (10.0, 30.0)
-"""Weights of distances from the bones' surfaces, in spacings squared, one after the other."""
-_ROUNDS = 40  # of fitting nodes to surfaces, at most
+"""Weights of squared distances from the bones' surfaces, per squared spacing, in successive passes."""
+_ROUNDS = 40  # largest number of iterations of fitting
 _LEAST = 0.2
-"""Least scaled Jacobian: nodes stay off the bones where they ask for worse, or for worse than it was where it was."""
+"""Smallest scaled Jacobian; nodes stay off the bones where it, or a smaller initial one, would not be kept."""
 _ALONG = 100
-"""Points of a bone's axis from which the nearest elements are asked for."""
+"""Number of points of a bone's axis for which the nearest elements are searched."""
 _SHORTER = 0.5
-"""Share of their way that nodes of elements which become too bad go instead."""
-_SLIDE = 0.02  # weight along the surface against 1 across it: nodes slide on a bone
+"""Factor by which the displacement of nodes of bad elements is repeatedly reduced."""
+_SLIDE = 0.02  # weight of tangential distance, per normal distance: nodes slide along a bone
 _END = 0.7
-"""Least cosine between a face's normal and the bone's direction at an end of the bone."""
+"""Smallest cosine between the bone's direction and the normals of faces of its ends."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A round shaft with flat ends, that may be bent and taper.
+    """A round shaft with flat ends, possibly bent and tapered.
 
     Attributes:
-        start: Where shares are counted from [m], shape (3,).
-        along: To where the share is one [m], shape (3,).
-        shift: Of its axis off that line at even shares from 0 to 1 [m], shape (K, 3).
-        radius: There [m], shape (K,).
-        near: Share at which it begins.
-        far: Share at which it ends.
+        start: Point at share 0 [m], shape (3,).
+        along: Vector from share 0 to share 1 [m], shape (3,).
+        shift: Offset of the axis from that line at K equidistant shares from 0 to 1 [m], shape (K, 3).
+        radius: Radius at these shares [m], shape (K,).
+        near: Share at the proximal end.
+        far: Share at the distal end.
     """
 
     start: Array
@@ -56,11 +56,11 @@ class Bone:
 
     @property
     def length(self) -> float:
-        """From share 0 to 1 [m]."""
+        """Length from share 0 to 1 [m]."""
         return float(np.linalg.norm(self.along))
 
     def around(self, points: Array) -> tuple[Array, Array, Array]:
-        """Share of points (n, 3), where they lie off the axis [m] (n, 3), and its radius there [m] (n,)."""
+        """Share of points (n, 3), their offset from the axis [m] (n, 3), and the radius there [m] (n,)."""
         share = (points - self.start) @ self.along / self.length**2
         t = np.linspace(0.0, 1.0, len(self.radius))
         shift = np.stack([np.interp(share, t, column) for column in self.shift.T], axis=1)
@@ -68,13 +68,13 @@ class Bone:
         return share, off, np.interp(share, t, self.radius)
 
     def depth(self, points: Array) -> Array:
-        """Distance of points (n, 3) from the axis over the radius; infinite before its beginning and after its end."""
+        """Distance of points (n, 3) from the axis per radius; infinite beyond the ends."""
         share, off, radius = self.around(points)
         inside = (share > self.near) & (share < self.far)
         return np.where(inside, np.linalg.norm(off, axis=1) / np.maximum(radius, 1e-12), np.inf)
 
     def threaded(self, mesh: HexMesh, chosen: NDArray[np.integer]) -> NDArray[np.integer]:
-        """Of chosen elements, those nearest to the axis along the bone whose middles lie between its ends."""
+        """Those of chosen elements that are nearest to points of the axis, with centres between the bone's ends."""
         middles = mesh.nodes[mesh.elements[chosen]].mean(axis=1)
         inside = np.isfinite(self.depth(middles))
         chosen, middles = chosen[inside], middles[inside]
@@ -89,15 +89,15 @@ class Bone:
 
 
 def claimed(mesh: HexMesh, bones: Sequence[Bone], bare: Collection[int] = ()) -> Ints:
-    """Bone that each element's middle lies in, the nearest of several, -1 in flesh, shape (E,).
+    """Bone that contains each element's centre, the nearest of several, -1 in flesh, shape (E,).
 
-    Elements of the outermost layer are flesh: there is skin over every bone. Where those below are so large that none
-    has its middle in a bone, it takes those nearest to its axis.
+    Elements of the outermost layer are flesh: every bone is covered by skin. If the elements are so large that none has
+    its centre in a bone, the bone consists of the elements nearest to its axis.
 
     Args:
         mesh: The mesh.
         bones: Their shapes.
-        bare: Bones that may take elements of the outermost layer, too.
+        bare: Bones that may contain elements of the outermost layer, too.
     """
     middles = mesh.nodes[mesh.elements].mean(axis=1)
     below = np.ones(len(middles), dtype=bool)
@@ -115,15 +115,15 @@ def claimed(mesh: HexMesh, bones: Sequence[Bone], bare: Collection[int] = ()) ->
 
 
 def fitted(mesh: HexMesh, elements: Mapping[int, Ints32], bones: Mapping[int, Bone], spacing: float) -> HexMesh:
-    """The mesh with the nodes between bones and flesh on the bones' surfaces, as far as elements stay well shaped.
+    """The mesh with nodes between bones and flesh moved to the bones' surfaces, as far as element quality permits.
 
-    Nodes on the mesh's own surface stay. A bone of few elements is a prism of few sides: its radius is what gives it
-    the section of the round one.
+    Nodes on the mesh's boundary stay. A bone of few elements is a prism with few sides: its radius is chosen such that
+    its section has the area of the round bone's.
 
     Args:
-        mesh: Nodes on its surface already.
+        mesh: Mesh that is already fitted to its surface.
         elements: Corners of each bone's elements, shape (n, 8).
-        bones: Their shapes, by the same numbers.
+        bones: Their shapes, under the same keys.
         spacing: Edge length of the elements [m].
     """
     still = np.zeros(len(mesh.nodes), dtype=bool)
@@ -146,7 +146,7 @@ def fitted(mesh: HexMesh, elements: Mapping[int, Ints32], bones: Mapping[int, Bo
             rounds=_ROUNDS,
             still=still,
         )
-    nodes[still] = mesh.nodes[still]  # but for rounding they are there
+    nodes[still] = mesh.nodes[still]  # remove rounding errors
     goal = nodes.copy()
     goal[number] = np.concatenate([hull.wanted(nodes)[0] for hull in hulls])
     least = np.minimum(_LEAST, mesh.scaled_jacobian())
@@ -160,10 +160,10 @@ class _Hull:
 
     Attributes:
         bone: The bone.
-        nodes: Those that may move, shape (n,).
-        side: Which lie on its side, shape (n,).
-        end: Share of the end they lie on, NaN elsewhere, shape (n,).
-        quads: Faces of its side, shape (F, 4).
+        nodes: The nodes that may move, shape (n,).
+        side: Mask of those on the lateral surface, shape (n,).
+        end: Share of the end that they lie on, NaN elsewhere, shape (n,).
+        quads: Faces of the lateral surface, shape (F, 4).
     """
 
     bone: Bone
@@ -174,7 +174,7 @@ class _Hull:
 
     @staticmethod
     def of(mesh: HexMesh, own: Ints32, bone: Bone, spacing: float, still: Mask) -> _Hull:
-        """Of the elements of a bone, by their corners (n, 8); nodes that stay are left out."""
+        """The hull of a bone's elements, given by their nodes (n, 8); ``still`` nodes are left out."""
         part = HexMesh(mesh.nodes, own, np.zeros(len(own), np.int32))
         quads = part.quads(part.boundary())
         x = mesh.nodes[quads]
@@ -194,7 +194,7 @@ class _Hull:
         return _Hull(bone, nodes, side[nodes], end[nodes], quads[~near & ~far])
 
     def wanted(self, nodes: Array) -> tuple[Array, Array, Array]:
-        """Where its nodes belong [m] (n, 3), normals there (n, 3), and how little they may slide (n,)."""
+        """Target positions of the nodes [m] (n, 3), normals there (n, 3), and relative tangential weights (n,)."""
         bone = self.bone
         x = nodes[self.nodes]
         share, off, radius = bone.around(x)
@@ -208,11 +208,11 @@ class _Hull:
         return target, normal, np.where(self.side & at_end, 1.0, _SLIDE)
 
     def _stretch(self, nodes: Array) -> float:
-        """Radius over the round bone's that gives its side, of flat faces, the same mean section."""
+        """Factor for the radius, so that the section of flat faces has the mean area of the round bone."""
         corners = nodes[self.quads]
         if not len(corners):
             return 1.0
-        # the section's area and the angle it takes, both as integrals over the side
+        # the section's area and the angle around the axis, both as integrals over the lateral surface
         area = turn = 0.0
         for u, v in ((a, b) for a in _GAUSS for b in _GAUSS):
             shape = np.array([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v])
@@ -224,7 +224,7 @@ class _Hull:
             flux = np.einsum("fi,fi->f", np.cross(du, dv), off)
             area += float((flux / np.maximum(radius, 1e-9) ** 2).sum())
             turn += float((flux / np.einsum("fi,fi->f", off, off)).sum())
-        # of the nodes' own mean radius, so that it does not depend on how near to the surface they are
+        # relative to the nodes' own mean radius, so as not to depend on their distance from the surface
         _, off, radius = self.bone.around(nodes[self.nodes[self.side]])
         own = float(np.mean(np.linalg.norm(off, axis=1) / np.maximum(radius, 1e-9))) if self.side.any() else 1.0
         return float(np.clip(own / np.sqrt(max(area / max(turn, 1e-12), 1e-12)), 1.0, 1.3))

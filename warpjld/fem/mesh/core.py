@@ -1,7 +1,7 @@
-"""Which cells of a regular grid a fitted mesh is grown from: those inside a surface, in one piece, into every limb.
+"""Selection of the interior cells of a regular grid from which a fitted mesh is grown (grid-based meshing).
 
-A cell is taken if it is inside with some room. Limbs thinner than about four cells may hold none, or pieces that do not
-hang together: there a path of cells whose middles are inside is added, and fitting squeezes it in.
+A cell is selected if it is inside with some margin. Limbs thinner than about four cells may contain none, or
+disconnected ones: there, a path of cells with centres inside is added, which fitting compresses.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["core_cells", "core_of", "make_manifold"]
 
 
 def core_cells(inside: Mask) -> Mask:
-    """Cells all of whose eight corners are inside; ``inside`` is of grid nodes, shape (ni + 1, nj + 1, nk + 1)."""
+    """Cells whose eight corners are inside; ``inside`` is a mask of grid nodes, shape (ni + 1, nj + 1, nk + 1)."""
     low, high = slice(None, -1), slice(1, None)
     out = np.ones([n - 1 for n in inside.shape], dtype=bool)
     for i in (low, high):
@@ -30,17 +30,17 @@ def core_cells(inside: Mask) -> Mask:
 
 
 def make_manifold(cells: Mask, spare: Mask | None = None) -> Mask:
-    """Change as few cells as it takes until no two meet at an edge or a corner only, and neither do two empty ones.
+    """Change as few cells as needed until no two cells, and no two empty ones, meet at an edge or corner only.
 
     Args:
-        cells: Chosen cells, an empty rim around them.
-        spare: Cells that may be added; others are only removed.
+        cells: Mask of cells, with an empty margin.
+        spare: Cells that may be added; all others may only be removed.
     """
     cells = cells.copy()
     left = np.zeros_like(cells) if spare is None else spare & ~cells
     while True:
         around = np.stack([_shifted(cells, corner) for corner in np.ndindex(2, 2, 2)], axis=-1)
-        wrong = _BROKEN[around @ _BITS]
+        wrong = _NONMANIFOLD[around @ _BITS]
         if not wrong.any():
             return cells
         count = ndimage.convolve(
@@ -48,38 +48,38 @@ def make_manifold(cells: Mask, spare: Mask | None = None) -> Mask:
         )
         for i, j, k in np.argwhere(wrong):
             block = tuple(slice(n - 1, n + 1) for n in (i, j, k))
-            cells[block], left[block] = _mended(cells[block], left[block], count[block])
+            cells[block], left[block] = _repaired(cells[block], left[block], count[block])
 
 
-def _mended(present: Mask, spare: Mask, count: Ints) -> tuple[Mask, Mask]:
-    """Eight cells around a node and what is still spare of them, changed least: cells that have few neighbours are
-    removed, or spare ones added."""
+def _repaired(present: Mask, spare: Mask, count: Ints) -> tuple[Mask, Mask]:
+    """The 2 × 2 × 2 cells around a node, repaired at the lowest cost, and the remaining spare ones: cells with few
+    neighbours are removed, or spare ones added."""
     price = np.where(present, 6.0 + count, np.where(spare, 8.0, np.inf)).ravel()
     pattern = present.ravel()
-    if not _BROKEN[int(pattern @ _BITS)]:
+    if not _NONMANIFOLD[int(pattern @ _BITS)]:
         return present, spare
-    best, mended = np.inf, present
+    best, repaired = np.inf, present
     for flips, number in zip(_FLIPS, _FLIPS @ _BITS, strict=True):
         cost = price[flips].sum()
-        if cost < best and not _BROKEN[int(pattern @ _BITS) ^ int(number)]:
-            best, mended = cost, (pattern ^ flips).reshape(2, 2, 2)
-    return mended, spare & ~mended & ~present
+        if cost < best and not _NONMANIFOLD[int(pattern @ _BITS) ^ int(number)]:
+            best, repaired = cost, (pattern ^ flips).reshape(2, 2, 2)
+    return repaired, spare & ~repaired & ~present
 
 
 def _shifted(cells: Mask, corner: tuple[int, int, int]) -> Mask:
-    """Cell at one of the eight places around each grid node."""
+    """Mask of the cells at one of the eight positions around each grid node."""
     out = np.zeros([n + 1 for n in cells.shape], dtype=bool)
     place = tuple(slice(1 - c, n + 1 - c) for c, n in zip(corner, cells.shape, strict=True))
     out[place] = cells
     return out
 
 
-def _broken_patterns() -> Mask:
-    """Which of the 256 ways to fill the cells around a node leave them, or the empty ones, in more than one piece."""
+def _nonmanifold_patterns() -> Mask:
+    """Mask of the 256 patterns of cells around a node whose filled or empty cells are not connected."""
     table = np.zeros(256, dtype=bool)
     corners = list(np.ndindex(2, 2, 2))
     for pattern in range(256):
-        # place (0, 0, 0) of _shifted is the cell above the node along every axis: its mirror is as good here
+        # position (0, 0, 0) of _shifted is the cell above the node along every axis; mirroring does not matter
         filled = np.zeros((2, 2, 2), dtype=bool)
         for bit, corner in enumerate(corners):
             filled[corner] = bool(pattern >> bit & 1)
@@ -87,34 +87,34 @@ def _broken_patterns() -> Mask:
     return table
 
 
-_BROKEN = _broken_patterns()
+_NONMANIFOLD = _nonmanifold_patterns()
 _BITS = 1 << np.arange(8)
 _FLIPS = np.array([[bool(n >> bit & 1) for bit in range(8)] for n in range(1, 256)])
 
 
 _MARGIN = 0.1
-"""Depth of the corners, edges' middles, faces' middles and middle of a cell that is taken, in spacings: fingers that
-are a little apart stay apart."""
+"""Smallest depth of corners, edge, face and cell centres of a selected cell, in spacings: keeps fingers with a small
+gap apart."""
 _PATH = 0.15
-"""Depth of the middle of a cell that a path may go through, in spacings."""
+"""Smallest depth of the centres of cells on a path, in spacings."""
 _BARE = 1.8
-"""Distance from the nearest cell taken, in spacings, from which on a path is laid."""
-_ROUNDS = 6  # of taking away what no path reaches, at most
+"""Distance from the nearest selected cell, in spacings, beyond which a path is added."""
+_ROUNDS = 6  # largest number of rounds of adding paths and repairing
 _BLOCK = 6
-"""Nodes along each edge of the blocks of a grid that one node may answer for."""
+"""Nodes along each edge of the blocks whose centre's distance may decide for all nodes."""
 _LARGEST = 60_000_000  # nodes of a grid; bounds memory
 
 
 def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask, Array]:
-    """Cells of the core, shape (ni, nj, nk), and the grid's first node [m], shape (3,).
+    """Cells of the core, shape (ni, nj, nk), and the position of the grid's first node [m], shape (3,).
 
     Args:
         envelope: The surface.
-        spacing: Edge of a cell [m].
-        notes: What is left out is added to them.
+        spacing: Edge length of a cell [m].
+        notes: A note on omitted pieces is appended.
 
     Raises:
-        InputError: A spacing too coarse for the surface, or so fine that memory would not do.
+        InputError: A spacing too coarse for the surface, or so fine that memory would not suffice.
     """
     low = envelope.vertices.min(axis=0) - 2.0 * spacing
     counts = np.ceil((envelope.vertices.max(axis=0) + 2.0 * spacing - low) / spacing).astype(int) + 1
@@ -122,13 +122,13 @@ def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask,
         raise InputError(f"spacing: {spacing:g} m would make a grid of {int(counts.prod()):,} nodes")
     lines = [low[k] + spacing * np.arange(counts[k]) for k in range(3)]
     grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
-    deep, inside = _sides(envelope, grid, _MARGIN * spacing)
-    room = _Room(envelope, grid, deep, inside, spacing)
+    deep, inside = _classify_nodes(envelope, grid, _MARGIN * spacing)
+    depths_of_cells = _CellDepths(envelope, grid, deep, inside, spacing)
     banned = np.zeros([n - 1 for n in counts], dtype=bool)
-    spare = room.middle > _PATH
-    cells = make_manifold(room.inside, spare)
+    spare = depths_of_cells.middle > _PATH
+    cells = make_manifold(depths_of_cells.inside, spare)
     for _ in range(_ROUNDS):
-        reached = room.reached(cells, banned)
+        reached = depths_of_cells.reached(cells, banned)
         kept = make_manifold(reached, spare & ~banned)
         banned |= reached & ~kept
         done = np.array_equal(kept, cells)
@@ -148,22 +148,22 @@ def core_of(envelope: Envelope, spacing: float, notes: list[str]) -> tuple[Mask,
     return cells, low
 
 
-class _Room:
-    """The grid's cells, and which are inside how far.
+class _CellDepths:
+    """The grid's cells and their depth inside the surface.
 
     Attributes:
-        inside: Cells to take, shape (ni, nj, nk).
-        middle: Depth of the cells' middles in spacings, -1 where no corner is inside, shape (ni, nj, nk).
+        inside: Cells to select, shape (ni, nj, nk).
+        middle: Depth of cell centres in spacings, -1 for cells without a corner inside, shape (ni, nj, nk).
     """
 
     def __init__(self, envelope: Envelope, grid: Array, deep: Mask, inside: Mask, spacing: float) -> None:
         self.inside = core_cells(deep)
-        some = ~core_cells(~inside)
-        places = np.stack(np.nonzero(some), axis=1)
-        ask = _Halves(envelope, grid, spacing)
+        touching = ~core_cells(~inside)
+        places = np.stack(np.nonzero(touching), axis=1)
+        ask = _HalfGridDepths(envelope, grid, spacing)
         middle = ask.depth(2 * places + 1)
-        # a surface may pass between corners that are all inside: the gap between two fingers; nowhere near a middle
-        # that is deep enough
+        # the surface may pass between corners that are all inside, as the gap between two fingers does, but not near a
+        # centre that is deep enough
         least = np.minimum(middle, 1.0)
         across = np.where(middle > _MARGIN, 1.0, -1.0)[None].repeat(3, axis=0)
         for offset in (np.array(p) - 1 for p in np.ndindex(3, 3, 3) if 1 in p and p != (1, 1, 1)):
@@ -181,7 +181,7 @@ class _Room:
         self._across[:, *at] = across
 
     def reached(self, cells: Mask, banned: Mask) -> Mask:
-        """Cells with paths added that join pieces, and that lead where surface is far from any cell."""
+        """Cells with added paths that connect pieces, and that lead to parts of the surface far from any cell."""
         open_ = ((self.middle > _PATH) & ~banned) | cells
         if not cells.any():
             deepest = np.unravel_index(int(self.middle.argmax()), self.middle.shape)
@@ -213,8 +213,8 @@ class _Room:
         return out | left
 
 
-class _Halves:
-    """Depths at a grid's nodes and half way between them, by twice their places; each is asked for once."""
+class _HalfGridDepths:
+    """Depths at a grid's nodes and half-way between them, by doubled indices; cached."""
 
     def __init__(self, envelope: Envelope, grid: Array, spacing: float) -> None:
         self._envelope, self._grid, self._spacing = envelope, grid, spacing
@@ -222,7 +222,7 @@ class _Halves:
         self._keys, self._depths = np.empty(0, np.int64), np.empty(0)
 
     def depth(self, places: Ints) -> Array:
-        """Depth under the surface at twice the places (n, 3), in spacings, shape (n,)."""
+        """Depth under the surface at doubled indices (n, 3), in spacings, shape (n,)."""
         wanted, rows = np.unique(np.ravel_multi_index(tuple(places.T), self._shape), return_inverse=True)
         fresh = wanted[~np.isin(wanted, self._keys, assume_unique=True)]
         twice = np.stack(np.unravel_index(fresh, self._shape), axis=1)
@@ -235,11 +235,11 @@ class _Halves:
         return out
 
 
-def _sides(envelope: Envelope, grid: Array, margin: float) -> tuple[Mask, Mask]:
-    """Which nodes of a grid (ni, nj, nk, 3) are deeper than a margin [m] inside a surface, and which are inside at all.
+def _classify_nodes(envelope: Envelope, grid: Array, margin: float) -> tuple[Mask, Mask]:
+    """Masks of the nodes of a grid (ni, nj, nk, 3) that are deeper than a margin [m], and that are inside.
 
-    Where a surface is closed its distance differs by no more than points are apart: a node far from it answers for
-    those around.
+    The distance from a closed surface changes by no more than the distance of points: a node far from the surface
+    decides for those around it.
     """
     shape = grid.shape[:3]
     distance = np.full(shape, np.nan)
@@ -258,7 +258,7 @@ def _sides(envelope: Envelope, grid: Array, margin: float) -> tuple[Mask, Mask]:
 
 
 class _Paths:
-    """Ways through cells that are open, the deeper the cheaper."""
+    """Shortest paths through permitted cells, where deeper cells are cheaper."""
 
     def __init__(self, open_: Mask, middle: Array, across: Array, cells: Mask) -> None:
         self._shape = open_.shape
@@ -279,12 +279,12 @@ class _Paths:
         self._graph = csr_array((0.5 * (price[i] + price[j]), (i, j)), shape=(len(price), len(price)))
 
     def nearest(self, start: Mask, ends: Mask) -> int | None:
-        """The end that is cheapest to reach, none if no end is."""
+        """Index of the end with the cheapest path, None if none is reachable."""
         self._search(start)
         return self._least(ends, self._cost)
 
     def deepest(self, start: Mask, ends: Mask) -> int | None:
-        """The deepest end that can be reached."""
+        """Index of the deepest reachable end."""
         self._search(start)
         return self._least(ends, np.where(np.isfinite(self._cost), -self._depth, np.inf))
 
@@ -300,7 +300,7 @@ class _Paths:
         return int(wanted[int(values[wanted].argmin())])
 
     def add(self, cells: Mask, target: int) -> None:
-        """Add the cells from the last search's start to a target."""
+        """Add the cells on the path from the last search's start to a target."""
         while target >= 0:
             cells[tuple(self._places[target])] = True
             target = int(self._before[target])

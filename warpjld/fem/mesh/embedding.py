@@ -1,4 +1,4 @@
-"""A visible surface carried by a volume mesh: the deformed envelope in its own topology (R104)."""
+"""Embedding of a surface in a volume mesh, so that it deforms with it and keeps its own topology (R104)."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from warpjld.fem.mesh.shape import CENTRE_GRADIENT, shape_at, slope_at
 __all__ = ["Embedding", "embed", "embed_between"]
 
 _NEAR = 12
-"""Elements looked at for each point, nearest centres first."""
+"""Candidate elements for each point, by distance of their centres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """Points held by the corners of the element they lie in, or nearest to.
+    """Points interpolated from the nodes of the element they lie in, or nearest to.
 
     Attributes:
-        corners: Nodes, shape (P, 8).
-        weights: Shape functions there, rows summing to one, shape (P, 8).
-        outside: How far each point is from its element, 0 inside, in element sizes, shape (P,).
+        corners: Nodes of the elements, shape (P, 8).
+        weights: Shape functions at the points, rows summing to one, shape (P, 8).
+        outside: Distance of each point from its element, 0 inside, in element sizes, shape (P,).
     """
 
     corners: Ints32
@@ -40,15 +40,15 @@ class Embedding:
 
 
 def embed(mesh: HexMesh, points: Array, *, reach: float = 1.0) -> Embedding:
-    """Find the element and the place in it of every point; points beyond the boundary are extrapolated.
+    """Find the element of every point and its coordinates there; points beyond the boundary are extrapolated.
 
     Args:
-        mesh: The volume mesh, at rest.
+        mesh: The volume mesh at rest.
         points: [m], shape (P, 3).
-        reach: How far beyond an element a point may lie, in element sizes.
+        reach: Largest distance of a point from its element, in element sizes.
 
     Raises:
-        InputError: A point further from the mesh than that.
+        InputError: A point further from the mesh than ``reach``.
     """
     x = mesh.nodes[mesh.elements]
     _, near = cKDTree(x.mean(axis=1)).query(points, k=min(_NEAR, len(x)))
@@ -65,7 +65,7 @@ def embed(mesh: HexMesh, points: Array, *, reach: float = 1.0) -> Embedding:
         better = beyond < best[todo]
         chosen = todo[better]
         best[chosen], place[chosen], owner[chosen] = beyond[better], at[better], near[chosen, column]
-    # beyond the boundary, where Newton's method may fail: from the nearest element's middle, straight on
+    # beyond the boundary Newton's method may fail: linear extrapolation from the nearest element's centre
     lost = np.flatnonzero(best > 1.0)
     if len(lost):
         element = x[near[lost, 0]]
@@ -80,12 +80,12 @@ def embed(mesh: HexMesh, points: Array, *, reach: float = 1.0) -> Embedding:
 
 
 def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], points: Array) -> Embedding:
-    """Embed points between others in the elements of these: another part of the mesh may lie nearer, but is not theirs.
+    """Embed points between others in the elements of these, even if another part of the mesh is nearer.
 
     Args:
-        mesh: The volume mesh, at rest.
-        ends: How it carries the others.
-        edges: The two that each point lies between, shape (P, 2).
+        mesh: The volume mesh at rest.
+        ends: Embedding of the other points.
+        edges: Indices of the two points that each point lies between, shape (P, 2).
         points: [m], shape (P, 3).
     """
     corners, weights = ends.corners[edges[:, 0]].copy(), ends.weights[edges[:, 0]].copy()
@@ -101,7 +101,7 @@ def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], po
 
 
 def _local(x: Array, points: Array) -> Array:
-    """Reference coordinates of points in elements (Newton's method), infinite where it does not converge."""
+    """Reference coordinates of points in elements (Newton's method); infinite where it does not converge."""
     at = np.zeros(points.shape)
     for _ in range(12):
         shape, slope = shape_at(at), slope_at(at)

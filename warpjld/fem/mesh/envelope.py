@@ -1,4 +1,4 @@
-"""A closed surface as a region of space: inside or outside, and how far (R104)."""
+"""A closed triangulated surface with signed distance (R104)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Envelope", "checked_surface"]
 
 
 _THREAD = 500
-"""Points that are worth another thread."""
+"""Number of points for which another thread is worthwhile."""
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class _Answer:
 
 
 class Envelope:
-    """Triangles that enclose a volume; holes are closed by fans, or bridged by the winding number, and reported.
+    """A triangulated surface that encloses a volume; holes are closed by fans or by the winding number, and reported.
 
     Args:
         vertices: [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
 
     Raises:
-        InputError: Not finite, indices out of range, or no volume.
+        InputError: Values that are not finite, indices out of range, or no enclosed volume.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
@@ -48,8 +48,8 @@ class Envelope:
         self.crowded_edges = int((uses > 2).sum())
         points, triangles = _capped(points, triangles)
         self.closed = _closed(triangles)
-        """Whether nothing of it is open, fans included, nor looks the other way: inside and outside are told apart
-        everywhere."""
+        """Whether the surface, including fans, is closed and consistently oriented, so that inside and outside are
+        defined everywhere."""
         corners = points[triangles]
         away = corners - points.mean(axis=0)
         volume = float(np.einsum("ti,ti->", away[:, 0], np.cross(away[:, 1], away[:, 2]))) / 6.0
@@ -73,11 +73,11 @@ class Envelope:
 
     @property
     def watertight(self) -> bool:
-        """Whether every edge has two faces."""
+        """Whether every edge has exactly two faces."""
         return self.open_edges == 0 and self.crowded_edges == 0
 
     def ask(self, points: Array) -> _Answer:
-        """Signed distance [m] (negative inside), closest point and the surface's normal there, of points (n, 3)."""
+        """Signed distance [m] (negative inside), closest point and surface normal there, for points (n, 3)."""
         import warp as wp
         from warpjld_kernels import fem_inside
 
@@ -106,7 +106,7 @@ class Envelope:
 
 
 def checked_surface(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints32]:
-    """Vertices (v, 3) and triangles (t, 3) as arrays; InputError where they are none, or indices out of range."""
+    """Vertices (v, 3) and triangles (t, 3) as arrays; InputError for wrong shapes or indices out of range."""
     points = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int32)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
@@ -119,7 +119,7 @@ def checked_surface(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints3
 
 
 def _closed(triangles: Ints32) -> bool:
-    """Whether every edge is passed as often one way as the other."""
+    """Whether every edge is used equally often in both directions."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
     count = np.int64(edges.max() + 1)
     _, pair = np.unique(edges.min(axis=1) * count + edges.max(axis=1), return_inverse=True)
@@ -127,7 +127,7 @@ def _closed(triangles: Ints32) -> bool:
 
 
 def _capped(points: Array, triangles: Ints32) -> tuple[Array, Ints32]:
-    """Vertices and triangles with a fan over every hole whose border is a single loop: a wrist that was cut off."""
+    """Vertices and triangles with a fan over every hole whose border is a simple loop, such as at a cut wrist."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     count = np.int64(len(points))
     open_ = edges[~np.isin(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0])]

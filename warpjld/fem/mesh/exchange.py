@@ -1,4 +1,4 @@
-"""Volume meshes from the files of other programs (meshio)."""
+"""Reader of volume meshes of other programs, by meshio."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["read_volume_mesh"]
 
-_CORNERS = {  # corners of our element, by the corners of theirs
+_CORNERS = {  # nodes of a (degenerate) hexahedron, as indices into the cell's nodes
     "hexahedron": [0, 1, 2, 3, 4, 5, 6, 7],
     "wedge": [0, 1, 2, 2, 3, 4, 5, 5],
     "tetra": [0, 1, 2, 2, 3, 3, 3, 3],
@@ -19,12 +19,12 @@ _CORNERS = {  # corners of our element, by the corners of theirs
 
 
 def read_volume_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
-    """Read hexahedra, prisms and tetrahedra (the last two as degenerate hexahedra, R96); other cells are left out.
+    """Read hexahedra, prisms and tetrahedra (the last two as degenerate hexahedra, R96); other cells are ignored.
 
-    Regions come from ``region``, ``gmsh:physical`` or ``medit:ref`` cell data, where there is one.
+    Regions are taken from ``region``, ``gmsh:physical`` or ``medit:ref`` cell data, if present.
 
     Args:
-        path: File in any format of meshio.
+        path: File in any format that meshio reads.
         scale: Metres per unit of the file.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Hexahedra inside any closed surface: a regular grid, one layer grown from it to the surface, nodes moved to fit."""
+"""Grid-based hexahedral meshing of a closed surface: a core of grid cells, one layer on its faces, fitted nodes."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from warpjld.geometry.rotations import unit
 __all__ = ["Fit", "fit_mesh", "mesh_surface_file"]
 
 _REPAIRS = 5
-"""Further rounds in which the pull is relaxed where elements suffer."""
+"""Further rounds in which the pull to the surface is reduced around bad elements."""
 _RETURNS = 6
-"""And rounds after those, in which what was relaxed goes on being pulled."""
+"""Final rounds in which reduced pulls are increased again."""
 _CLOSE = 0.05
-"""Distance of all boundary nodes from the surface, in spacings, that ends this."""
+"""Largest distance of boundary nodes from the surface, in spacings, at which the final rounds end."""
 _NEARER = 0.9
-"""So does a greatest distance that does not fall below this share of the best so far."""
-_LED = 0.3
-"""Pull of nodes that go where their neighbours go, over that of others."""
+"""Largest ratio of distances of successive final rounds that counts as progress."""
+_FOLLOWING = 0.3
+"""Pull of nodes that follow their neighbours, per pull of others."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted mesh and how well it fits.
+    """A fitted mesh with quality measures.
 
     Attributes:
-        mesh: Faces ``surface`` are the boundary.
-        least: Least scaled Jacobian.
+        mesh: The mesh; the face set ``surface`` is its boundary.
+        least: Smallest scaled Jacobian.
         mean: Mean scaled Jacobian.
-        gap: Greatest distance of a boundary node from the surface [m].
-        volume: Volume of the mesh over that of the surface.
-        notes: What was found and done, for people.
+        gap: Largest distance of a boundary node from the surface [m].
+        volume: Volume of the mesh per volume of the surface.
+        notes: Information for the user.
     """
 
     mesh: HexMesh
@@ -58,12 +58,12 @@ def fit_mesh(envelope: Envelope, spacing: float, *, least: float = 0.1, name: st
     Args:
         envelope: The surface, watertight or not.
         spacing: Edge length of the elements [m].
-        least: Least scaled Jacobian: boundary nodes stay off the surface where it asks for worse.
+        least: Smallest scaled Jacobian; boundary nodes stay off the surface where it would not be kept.
         name: Region name.
-        rounds: Times the nodes are moved and asked for their closest points again.
+        rounds: Number of rounds of moving nodes and updating their closest points.
 
     Raises:
-        InputError: A spacing too coarse for the surface, or so fine that memory would not do; quality not reached.
+        InputError: A spacing too coarse for the surface, or so fine that memory would not suffice; quality not reached.
     """
     if not spacing > 0:
         raise InputError(f"spacing: want a length above 0 m, got {spacing}")
@@ -74,8 +74,8 @@ def fit_mesh(envelope: Envelope, spacing: float, *, least: float = 0.1, name: st
             "more than two faces): holes were closed, inside and outside told apart by winding number"
         )
     cells, origin = core_of(envelope, spacing, notes)
-    mesh, boundary = _grown(cells, origin, spacing, name)
-    fitted, backed = _settled(mesh, boundary, envelope, spacing, least, rounds)
+    mesh, boundary = _with_boundary_layer(cells, origin, spacing, name)
+    fitted, backed = _fit_boundary(mesh, boundary, envelope, spacing, least, rounds)
     quality = fitted.scaled_jacobian()
     if quality.min() < least:
         raise InputError(
@@ -107,8 +107,8 @@ def mesh_surface_file(path: Path, *, spacing: float, scale: float = 1.0) -> Fit:
     return fit_mesh(Envelope(scale * np.asarray(loaded.vertices), np.asarray(loaded.faces)), spacing)
 
 
-def _grown(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMesh, Ints]:
-    """The cells and one layer of elements on each of their free faces."""
+def _with_boundary_layer(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMesh, Ints]:
+    """The core's cells with one layer of elements on each free face, and the nodes of the boundary."""
     shape = [n + 1 for n in cells.shape]
     every = elements_of(np.arange(int(np.prod(shape)), dtype=np.int32).reshape(shape))[cells.ravel()]
     used, elements = np.unique(every, return_inverse=True)
@@ -127,7 +127,7 @@ def _grown(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMe
     layer = np.concatenate([quads, outer[quads]], axis=1)
     all_elements = np.concatenate([elements, layer]).astype(np.int32)
     faces = np.stack([len(elements) + np.arange(len(layer)), np.full(len(layer), 5)], axis=1).astype(np.int32)
-    # multigrid's grid: a layer node is where it was grown to, one cell outwards
+    # for multigrid, a layer node is at the lattice point one cell outwards
     grown = lattice[skin] + np.rint(outwards * 1.2).astype(np.int32)
     mesh = HexMesh(
         np.concatenate([nodes, nodes[skin] + 0.6 * spacing * outwards]),
@@ -142,17 +142,18 @@ def _grown(cells: Mask, origin: Array, spacing: float, name: str) -> tuple[HexMe
     return mesh, len(nodes) + np.arange(len(skin))
 
 
-def _settled(
+def _fit_boundary(
     mesh: HexMesh, boundary: Ints, envelope: Envelope, spacing: float, least: float, rounds: int
 ) -> tuple[HexMesh, int]:
-    """Boundary nodes on the surface and well-shaped elements, as far as both go together.
+    """Move boundary nodes to the surface and keep elements well shaped, as far as both are possible.
 
-    Boundary nodes are pulled to their closest points ever harder; where elements suffer the pull is relaxed, and where
-    the closest point looks the other way (the far side of a fold, a neighbouring finger) nodes go where neighbours
-    go. Once all elements are good, what is still off the surface is pulled on, as long as that brings it nearer.
+    Boundary nodes are pulled to their closest points with increasing weight; around bad elements the pull is reduced,
+    and nodes whose closest point faces the other way (the far side of a fold, a neighbouring finger) follow their
+    neighbours. Once all elements are good, the pull is increased again as long as this reduces the distance. Returns
+    the mesh and the number of nodes off the surface.
     """
     quads = mesh.quads(mesh.face_set("surface"))
-    links = _links(quads, boundary)
+    links = _adjacency(quads, boundary)
     nodes = mesh.nodes
     relaxed = np.ones(len(boundary))
     best: tuple[HexMesh, int] | None = None
@@ -163,8 +164,8 @@ def _settled(
         outwards = np.zeros_like(nodes)
         np.add.at(outwards, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
         agrees = np.einsum("bi,bi->b", outwards[boundary], answer.normal) > 0.0
-        target, normal = _led(nodes[boundary], answer.closest, answer.normal, agrees, links)
-        strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * np.where(agrees, 1.0, _LED)
+        target, normal = _follow_neighbours(nodes[boundary], answer.closest, answer.normal, agrees, links)
+        strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * np.where(agrees, 1.0, _FOLLOWING)
         nodes = improve(
             nodes,
             mesh.elements,
@@ -178,7 +179,7 @@ def _settled(
         if number + 1 < rounds:
             continue
         moved = replace(mesh, nodes=nodes)
-        snapped = _snapped(moved, boundary, agrees & (relaxed > 0.01), envelope, least)
+        snapped = _projected(moved, boundary, agrees & (relaxed > 0.01), envelope, least)
         if snapped[0].scaled_jacobian().min() >= least:
             away = float(np.abs(envelope.ask(snapped[0].nodes[boundary]).distance).max())
             if best is None or away < _NEARER * nearest:
@@ -201,16 +202,16 @@ def _settled(
     return snapped if best is None else best
 
 
-def _links(quads: Ints32, boundary: Ints) -> Any:
-    """Which boundary nodes share an edge, symmetric ``csr_array`` (B, B)."""
+def _adjacency(quads: Ints32, boundary: Ints) -> Any:
+    """Adjacency of boundary nodes by edges, a symmetric ``csr_array`` (B, B)."""
     row = np.searchsorted(boundary, quads)
     one, other = row.ravel(), np.roll(row, -1, axis=1).ravel()
     table = csr_array((np.ones(len(one)), (one, other)), shape=(len(boundary), len(boundary)))
     return table + table.T
 
 
-def _led(nodes: Array, closest: Array, normal: Array, agrees: Mask, links: Any) -> tuple[Array, Array]:
-    """Targets and normals; nodes whose own closest point is none for them move as their neighbours do."""
+def _follow_neighbours(nodes: Array, closest: Array, normal: Array, agrees: Mask, links: Any) -> tuple[Array, Array]:
+    """Targets and normals; nodes with an invalid closest point take the mean displacement of their neighbours."""
     move = np.where(agrees[:, None], closest - nodes, 0.0)
     facing = np.where(agrees[:, None], normal, 0.0)
     known = agrees.copy()
@@ -226,8 +227,9 @@ def _led(nodes: Array, closest: Array, normal: Array, agrees: Mask, links: Any) 
     return nodes + move, np.where(size > 1e-6, facing / np.maximum(size, 1e-6), normal)
 
 
-def _snapped(mesh: HexMesh, boundary: Ints, chosen: Mask, envelope: Envelope, least: float) -> tuple[HexMesh, int]:
-    """Boundary nodes put on the surface, less far where an element would become worse than ``least``."""
+def _projected(mesh: HexMesh, boundary: Ints, chosen: Mask, envelope: Envelope, least: float) -> tuple[HexMesh, int]:
+    """The mesh with boundary nodes projected on the surface, less far at elements that would become worse than
+    ``least``; and the number of nodes that are not on it."""
     start = mesh.nodes
     goal = start.copy()
     goal[boundary] = envelope.ask(start[boundary]).closest

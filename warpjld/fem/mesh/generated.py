@@ -1,4 +1,4 @@
-"""Generated meshes: boxes; balls, cylinders and fingers as an O-grid laid over round shapes (cubed sphere)."""
+"""Generated meshes: boxes; and balls, cylinders and fingers as O-grids (cubed sphere)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def box_hexes(
     origin: ArrayLike = (0.0, 0.0, 0.0),
     name: str = "body",
 ) -> HexMesh:
-    """A box of ``counts`` elements, its faces named ``x-``, ``x+``, ``y-``, ``y+``, ``z-``, ``z+``.
+    """A box of ``counts`` elements with face sets ``x-``, ``x+``, ``y-``, ``y+``, ``z-``, ``z+``.
 
     Args:
         size: Edge lengths [m].
@@ -51,7 +51,7 @@ def box_hexes(
 
 _ALL = ("x-", "x+", "y-", "y+", "z-", "z+")
 _ROUND = 0.45
-"""How far the core leans from a cube (0) to a ball (1): angles stay open enough at its edges."""
+"""Shape of the core, from a cube (0) to a ball (1): keeps angles at its edges open enough."""
 
 
 def ball_hexes(
@@ -59,18 +59,18 @@ def ball_hexes(
 ) -> HexMesh:
     """A ball or a spherical shell about the origin.
 
-    Regions: ``core`` and ``envelope`` when solid, ``envelope`` when hollow. Faces: ``outer``; ``inner`` of a shell; and
+    Regions: ``core`` and ``envelope`` if solid, ``envelope`` if hollow. Faces: ``outer``; ``inner`` of a shell; and
     of an octant (x, y, z ≥ 0) the symmetry planes ``x0``, ``y0``, ``z0``.
 
     Args:
         radius: Outer radius [m].
         inner: Inner radius of a shell [m]; 0 for a solid ball.
-        n: Elements along an edge of each of the six patches (of an octant's three: the same edge, cut in half).
-        layers: Elements through the wall, or from core to surface; by default n/2 when solid, else as thick as wide.
-        octant: Only one eighth.
+        n: Elements along an edge of each of the six patches (of an octant's three, half the edge of a whole ball's).
+        layers: Elements through the wall, or from core to surface; n/2 by default if solid, else as thick as wide.
+        octant: Whether to make one eighth only.
 
     Raises:
-        InputError: Radii or counts that make no ball.
+        InputError: Radii or counts out of range.
     """
     if not radius > 0 or not 0 <= inner < radius:
         raise InputError(f"want 0 ≤ inner < radius, got inner = {inner} and radius = {radius}")
@@ -99,22 +99,22 @@ def cylinder_hexes(
     along: int = 8,
     quarter: bool = False,
 ) -> HexMesh:
-    """A cylinder about the z axis from z = 0, solid with a core (its bone, say) or a tube.
+    """A cylinder about the z axis from z = 0, solid with a core (such as a bone) or a tube.
 
-    Regions: ``core`` and ``envelope`` when solid, ``envelope`` when hollow. Faces: ``outer``, ``bottom``, ``top``;
+    Regions: ``core`` and ``envelope`` if solid, ``envelope`` if hollow. Faces: ``outer``, ``bottom``, ``top``;
     ``inner`` of a tube; of a quarter (x, y ≥ 0) the symmetry planes ``x0``, ``y0``.
 
     Args:
         radius: Outer radius [m].
         length: Length [m].
         inner: Radius of the bore [m]; 0 for a solid cylinder, whose core has half the radius.
-        n: Elements along an edge of each of the four patches (a quarter's two: half of it).
-        layers: Elements through the wall; by default n/2.
+        n: Elements along an edge of each of the four patches (of a quarter's two, half of that edge).
+        layers: Elements through the wall; n/2 by default.
         along: Elements along z.
-        quarter: Only one quarter.
+        quarter: Whether to make one quarter only.
 
     Raises:
-        InputError: Radii, length or counts that make no cylinder.
+        InputError: Radii, length or counts out of range.
     """
     if not radius > 0 or not 0 <= inner < radius or not length > 0:
         raise InputError(f"want 0 ≤ inner < radius and length > 0, got {inner}, {radius} and {length}")
@@ -140,20 +140,20 @@ def finger_hexes(
     layers: int | None = None,
     along: int = 16,
 ) -> HexMesh:
-    """A finger about the z axis, open base at z = 0 and round tip at z = length, with a bone inside.
+    """A finger about the z axis with an open base at z = 0, a round tip at z = length, and a bone inside.
 
     Regions: ``bone`` and ``flesh``. Faces: ``skin`` (outer) and ``base``.
 
     Args:
         radius: Radius of the skin [m].
-        length: From base to tip [m].
-        bone: Radius of the bone over that of the skin.
+        length: Length from base to tip [m].
+        bone: Radius of the bone, per radius of the skin.
         n: Elements across the bone, an even number.
-        layers: Elements from bone to skin; by default n/2.
+        layers: Elements from bone to skin; n/2 by default.
         along: Elements along the straight part.
 
     Raises:
-        InputError: Measures that make no finger.
+        InputError: Measures out of range.
     """
     if not 0 < radius < length or not 0 < bone < 1:
         raise InputError(f"want 0 < radius < length and 0 < bone < 1, got {radius}, {length} and {bone}")
@@ -180,9 +180,9 @@ def finger_hexes(
 
 
 def _round(s: Array, depth: Array, outer: float, inner: float, axes: Array, solid: bool) -> Array:
-    """Points of the cube |s| ≤ 1 (or square, where ``axes`` says so) and of the layers around it, made round.
+    """Positions of nodes of the cube |s| ≤ 1 (or square, by ``axes``) and of the layers around it, on rounded shapes.
 
-    Directions are equiangular, tan(π s/4), which keeps elements of a patch alike in size.
+    Directions are equiangular, tan(π s/4), so that elements of a patch have similar sizes.
     """
     bent = np.tan(0.25 * np.pi * s) * axes
     norm = np.linalg.norm(bent, axis=1)
@@ -191,7 +191,7 @@ def _round(s: Array, depth: Array, outer: float, inner: float, axes: Array, soli
         return direction * (inner + (outer - inner) * depth)[:, None]
     reach = np.abs(s * axes).max(axis=1)
     corner = np.sqrt(axes.sum())
-    # a cube and a ball of like size, blended: the core; straight lines from it to the surface: the layers
+    # core: a blend of a cube and a ball of similar size; layers: straight lines from there to the surface
     cube = s * axes * (2.0 / (1.0 + corner))
     core = inner * ((1.0 - _ROUND) * cube + _ROUND * direction * reach[:, None])
     return core + depth[:, None] * (outer * direction - core)

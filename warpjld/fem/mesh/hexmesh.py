@@ -1,4 +1,4 @@
-"""A mesh of 8-node elements: what every other part of ``fem`` starts from."""
+"""Meshes of 8-node hexahedra with regions and named face and node sets."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ class HexMesh:
 
     Attributes:
         nodes: Rest positions [m], shape (N, 3).
-        elements: Corners, shape (E, 8).
+        elements: Nodes, shape (E, 8).
         regions: Region of each element, an index into ``region_names``, shape (E,).
-        region_names: Names that materials are given to.
-        faces: Named parts of the boundary: element and local face (see ``FACES``), shape (F, 2) each.
+        region_names: Names of the regions, to which materials are assigned.
+        faces: Named face sets: element and local face (see ``FACES``), shape (F, 2) each.
         node_sets: Named nodes, shape (n,) each.
-        blocks: Structured grids of node numbers, shape (ni + 1, nj + 1, nk + 1) each, that together are the mesh; empty
-            where it is not structured. A multigrid hierarchy takes every other line of them.
-        lattice: Integer coordinates of the nodes on a regular grid, shape (N, 3), for meshes cut from one.
-        parts: The meshes that were merged into this one, in the order of their nodes; empty for a single one.
+        blocks: Structured grids of node indices, shape (ni + 1, nj + 1, nk + 1) each, that together form the mesh;
+            empty if it is unstructured. A multigrid hierarchy takes every other line of them.
+        lattice: Integer coordinates of the nodes on a regular grid, shape (N, 3), for meshes made from one.
+        parts: The meshes that were merged into this one, in the order of their nodes; empty for a single mesh.
     """
 
     nodes: Array
@@ -80,11 +80,11 @@ class HexMesh:
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
     def boundary(self) -> Ints32:
-        """Faces that belong to one element only: element and local face, shape (F, 2). They are the surface (R96)."""
+        """Faces of one element only, the surface of the mesh: element and local face, shape (F, 2) (R96)."""
         corners = np.sort(self.elements[:, FACES].reshape(-1, 4), axis=1)
         repeated = np.zeros(corners.shape, dtype=bool)
         repeated[:, 1:] = corners[:, 1:] == corners[:, :-1]
-        corners[repeated] = -1  # a triangle is one whichever corner it repeats
+        corners[repeated] = -1  # degenerate quads are the same triangle whichever corner is repeated
         corners.sort(axis=1)
         order = np.lexsort(corners.T)
         fresh = np.ones(len(corners) + 1, dtype=bool)
@@ -96,7 +96,7 @@ class HexMesh:
         return np.stack([index // 6, index % 6], axis=1).astype(np.int32)
 
     def edges(self) -> Ints32:
-        """The nodes that an edge of an element joins, the lower first, each pair once and in order, shape (n, 2)."""
+        """Node pairs joined by element edges, smaller index first, sorted and unique, shape (n, 2)."""
         ends = np.sort(self.elements[:, EDGES].reshape(-1, 2), axis=1).astype(np.int64)
         count = len(self.nodes)
         keys = np.unique(ends[:, 0] * count + ends[:, 1])
@@ -108,10 +108,10 @@ class HexMesh:
         return self.elements[faces[:, :1], FACES[faces[:, 1]]]
 
     def face_set(self, name: str) -> Ints32:
-        """Named faces; ``surface`` is the whole boundary.
+        """The face set of a name; ``surface`` is the whole boundary.
 
         Raises:
-            InputError: No such name.
+            InputError: Unknown name.
         """
         if name in self.faces:
             return self.faces[name]
@@ -120,10 +120,10 @@ class HexMesh:
         raise InputError(_unknown("face set", name, [*self.faces, "surface"]))
 
     def node_set(self, name: str) -> Ints32:
-        """Nodes of a named set, or of a named part of the boundary, or of a region.
+        """Nodes of a node set, face set or region.
 
         Raises:
-            InputError: No such name.
+            InputError: Unknown name.
         """
         if name in self.node_sets:
             return self.node_sets[name]
@@ -137,16 +137,16 @@ class HexMesh:
         """Mask of the elements of a region.
 
         Raises:
-            InputError: No such region.
+            InputError: Unknown region.
         """
         if name not in self.region_names:
             raise InputError(_unknown("region", name, list(self.region_names)))
         return self.regions == self.region_names.index(name)
 
     def scaled_jacobian(self) -> Array:
-        """Least scaled Jacobian over the corners of each element: 1 for a box, ≤ 0 for an inverted corner, shape (E,).
+        """Smallest scaled Jacobian over the corners of each element: 1 for a box, ≤ 0 if inverted, shape (E,).
 
-        Corners whose edges collapse (prisms, tetrahedra) do not count.
+        Corners with collapsed edges (of prisms, tetrahedra) are skipped.
         """
         x = self.nodes[self.elements]
         out = np.full(len(x), np.inf)
@@ -163,12 +163,12 @@ class HexMesh:
         return replace(self, nodes=self.nodes + displacement.reshape(-1, 3))
 
     def with_nodes(self, **sets: Ints32) -> HexMesh:
-        """The same mesh with more named nodes."""
+        """The same mesh with further node sets."""
         return replace(self, node_sets={**self.node_sets, **sets})
 
 
 def elements_of(grid: Ints32) -> Ints32:
-    """Elements of a structured grid of node numbers (ni + 1, nj + 1, nk + 1), x index slowest, shape (ni nj nk, 8)."""
+    """Elements of a structured grid of node indices (ni + 1, nj + 1, nk + 1), x index slowest, shape (ni nj nk, 8)."""
     low, high = slice(None, -1), slice(1, None)
     corners = [
         grid[low, low, low],
@@ -184,7 +184,7 @@ def elements_of(grid: Ints32) -> Ints32:
 
 
 def merge(*meshes: HexMesh) -> HexMesh:
-    """Several bodies as one mesh, not tied to one another; sets of the same name are joined (R101)."""
+    """Several unconnected bodies as one mesh; sets of the same name are united (R101)."""
     names = tuple(dict.fromkeys(name for mesh in meshes for name in mesh.region_names))
     offset = 0
     count = 0

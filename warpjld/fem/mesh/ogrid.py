@@ -1,4 +1,4 @@
-"""Layers of elements around a box: the topology of balls (cubed spheres), cylinders and fingers, all hexahedra."""
+"""O-grid topology: layers of hexahedra around a box, for balls (cubed spheres), cylinders and fingers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from warpjld.fem.mesh.hexmesh import elements_of
 
 __all__ = ["Ogrid", "ogrid_hexes"]
 
-_SIDES = {  # axis, end, and the two axes that make a right-handed triple with the outward direction
+_SIDES = {  # axis, end, and the two axes that form a right-handed triple with the outward direction
     "x-": (0, 0, 2, 1),
     "x+": (0, 1, 1, 2),
     "y-": (1, 0, 0, 2),
@@ -24,17 +24,17 @@ _SIDES = {  # axis, end, and the two axes that make a right-handed triple with t
 
 @dataclass(frozen=True, eq=False)
 class Ogrid:
-    """Topology: where each node is in the box and in the layers, and the structured blocks.
+    """Topology: position of each node in box and layers, and structured blocks.
 
     Attributes:
-        place: Node's place in the box, counted in elements, shape (N, 3). Layer nodes have that of their foot.
+        place: Position of each node in the box, in elements, shape (N, 3); of a layer node that of its foot point.
         layer: Layer of each node, 0 in the box, shape (N,).
-        elements: Corners, those of the core first, shape (E, 8).
+        elements: Nodes, those of the core's elements first, shape (E, 8).
         core: Number of elements of the core.
         outer: Faces of the last layer, shape (F, 2).
-        inner: Faces of the first layer that look inwards, empty where there is a core, shape (F, 2).
-        ends: Faces left open, by the name of the box's side, shape (F, 2) each.
-        blocks: Structured grids of node numbers.
+        inner: Inward faces of the first layer, empty with a core, shape (F, 2).
+        ends: Faces of sides without layers, by the name of the box's side, shape (F, 2) each.
+        blocks: Structured grids of node indices.
     """
 
     place: Ints32
@@ -53,8 +53,8 @@ def ogrid_hexes(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...
     Args:
         counts: Elements of the box along x, y, z.
         layers: Layers around it.
-        sides: Sides that carry layers, of ``x-``, ``x+``, ``y-``, ``y+``, ``z-``, ``z+``.
-        core: Whether the box itself is meshed, or left hollow.
+        sides: Sides with layers, of ``x-``, ``x+``, ``y-``, ``y+``, ``z-``, ``z+``.
+        core: Whether the box itself is meshed or hollow.
 
     Raises:
         InputError: Counts that are not positive.
@@ -90,7 +90,7 @@ def ogrid_hexes(counts: tuple[int, int, int], layers: int, sides: tuple[str, ...
 
 
 def _numbers(count: int, feet: Ints, levels: range, inside: int) -> Ints32:
-    """Number of the node over each of the box's in every layer, the box's own first, shape (layers + 1, count)."""
+    """Index of the node over each node of the box in every layer, the box's own first, shape (layers + 1, count)."""
     column = np.full(count, -1)
     column[feet] = np.arange(len(feet))
     out = np.empty((levels.stop, count), dtype=np.int32)
@@ -101,7 +101,7 @@ def _numbers(count: int, feet: Ints, levels: range, inside: int) -> Ints32:
 
 
 def _layers(grid: Ints32, numbers: Ints32, side: str) -> Ints32:
-    """The structured block over a side of the box."""
+    """The structured block of node indices over a side of the box."""
     axis, end, u, v = _SIDES[side]
     sheet = np.take(grid, -end, axis=axis)
     sheet = sheet.T if u > v else sheet
@@ -111,7 +111,7 @@ def _layers(grid: Ints32, numbers: Ints32, side: str) -> Ints32:
 def _boundary(
     shapes: list[tuple[int, ...]], sides: tuple[str, ...], core: bool
 ) -> tuple[Ints32, Ints32, dict[str, Ints32]]:
-    """Faces of the last layer and of the first, and those left open by the name of the box's side."""
+    """Faces of the last layer, of the first layer, and of sides without layers by the name of the box's side."""
     sizes = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)])
     cells = [start + np.arange(np.prod(shape)).reshape(shape) for start, shape in zip(sizes[:-1], shapes, strict=True)]
     ends: dict[str, list[Ints32]] = {side: [] for side in _SIDES if side not in sides}

@@ -1,4 +1,4 @@
-"""Shape functions of the 8-node element, in NumPy: loads, stresses, interpolation."""
+"""Shape functions of the 8-node hexahedron in NumPy, for loads, stresses and interpolation."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ POINTS = CORNERS / np.sqrt(3.0)
 
 
 def shape_at(points: Array) -> Array:
-    """N_a at reference points (n, 3), shape (n, 8)."""
+    """Shape functions N_a at reference points (n, 3), shape (n, 8)."""
     out: Array = np.prod(1.0 + CORNERS[None] * points[:, None], axis=2) / 8.0
     return out
 
 
 def slope_at(points: Array) -> Array:
-    """∂N_a/∂ξ_j at reference points (n, 3), shape (n, 8, 3)."""
+    """Derivatives ∂N_a/∂ξ_j at reference points (n, 3), shape (n, 8, 3)."""
     h = 1.0 + CORNERS[None] * points[:, None]
     pairs = np.stack([h[..., 1] * h[..., 2], h[..., 0] * h[..., 2], h[..., 0] * h[..., 1]], axis=-1)
     return CORNERS[None] * pairs / 8.0

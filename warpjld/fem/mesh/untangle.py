@@ -1,8 +1,8 @@
-"""Moving the nodes of a mesh so that its elements are well shaped.
+"""Mesh untangling and smoothing by a regularised shape measure.
 
 Minimises, over all corners of all elements, the shape measure |A|³ / (3√3 det A) of the corner's three edges A (1 for
-a cube), with the determinant regularised so that corners turned inside out can be turned back (Escobar et al. 2003,
-doi:10.1016/S0045-7825(03)00299-8), and pulls boundary nodes to the tangent planes they belong to.
+a cube), with the determinant regularised so that inverted corners can recover (Escobar et al. 2003,
+doi:10.1016/S0045-7825(03)00299-8), and pulls boundary nodes to their tangent planes.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ def improve(
     rounds: int = 60,
     still: Mask | None = None,
 ) -> Array:
-    """Better positions of the nodes.
+    """Optimised positions of the nodes [m], shape (N, 3).
 
     Args:
-        nodes: [m], shape (N, 3).
-        elements: Corners, shape (E, 8).
-        spacing: Edge length that is wanted [m].
+        nodes: Initial positions [m], shape (N, 3).
+        elements: Nodes of the elements, shape (E, 8).
+        spacing: Desired edge length [m].
         boundary: Nodes pulled to the surface, shape (B,).
         targets: Their closest points on it [m], shape (B, 3).
         normals: Its normals there, shape (B, 3).
-        pull: Weight of each one's distance along the normal, shape (B,); across it a node slides almost freely.
-        slide: Weight of the distance across the normal, relative to ``pull``: one for all, or each one's, shape (B,).
-        softness: Regularisation of the determinant; the smaller, the more worst corners count.
-        rounds: Iterations.
-        still: Nodes that stay where they are, shape (N,).
+        pull: Weight of each node's distance along the normal, shape (B,).
+        slide: Weight of the tangential distance, relative to ``pull``: one for all, or one per node, shape (B,).
+        softness: Regularisation of the determinant; the smaller, the larger the influence of the worst corners.
+        rounds: Number of iterations.
+        still: Mask of fixed nodes, shape (N,).
     """
     sliding = np.broadcast_to(np.asarray(slide, dtype=np.float64), (len(boundary),))
     measure = _ShapeMeasure(nodes / spacing, elements, softness)
@@ -69,7 +69,7 @@ def improve(
 
 
 class _ShapeMeasure:
-    """Sum of the corners' shape measures, and its gradient (n, 3), at nodes x (n, 3)."""
+    """Sum of the corners' shape measures at nodes x (n, 3), and its gradient (n, 3)."""
 
     def __init__(self, x: Array, elements: Ints32, softness: float) -> None:
         import warp as wp
@@ -98,14 +98,14 @@ class _ShapeMeasure:
 
 
 def as_far(mesh: HexMesh, start: Array, goal: Array, least: float | Array, shorter: float) -> HexMesh:
-    """The mesh with its nodes moved from a start towards a goal, less far where elements would become too bad.
+    """The mesh with nodes moved from a start towards a goal, less far where elements would become bad.
 
     Args:
-        mesh: Its elements.
-        start: [m], shape (N, 3).
-        goal: [m], shape (N, 3).
-        least: Scaled Jacobian that elements keep: one for all, or each one's, shape (E,).
-        shorter: Share of their way that the nodes of worse ones go instead, again and again.
+        mesh: Mesh with the elements.
+        start: Initial positions [m], shape (N, 3).
+        goal: Target positions [m], shape (N, 3).
+        least: Smallest scaled Jacobian of elements: one for all, or one per element, shape (E,).
+        shorter: Factor by which the displacement of nodes of bad elements is repeatedly reduced.
     """
     share = np.ones((len(start), 1))
     for _ in range(16):
@@ -117,19 +117,19 @@ def as_far(mesh: HexMesh, start: Array, goal: Array, least: float | Array, short
     return moved
 
 
-_MEMORY = 10  # pairs of L-BFGS
+_MEMORY = 10  # number of correction pairs of L-BFGS
 _SHORTEST = 1e-10  # step length at which the line search gives up
 
 
 def lbfgs(cost: Callable[[Array], tuple[float, Array]], start: Array, *, rounds: int, first_step: float) -> Array:
-    """A lower point of ``cost``, after at most so many rounds (Nocedal & Wright, algorithm 7.5, Armijo steps).
+    """Minimise ``cost`` by at most ``rounds`` steps of L-BFGS (Nocedal & Wright, algorithm 7.5, Armijo steps).
 
-    SciPy's does the same through BLAS, whose threads wait for one another at every dot product of these sizes.
+    SciPy's implementation uses BLAS, whose threads synchronise at every dot product of this size.
 
     Args:
-        cost: Value and gradient at a point.
+        cost: Function that returns value and gradient at a point.
         start: First point, shape (n,).
-        rounds: Steps at most.
+        rounds: Largest number of steps.
         first_step: Largest change of one variable in the first step.
     """
     x = start.copy()

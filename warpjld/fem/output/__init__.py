@@ -1,1 +1,1 @@
-"""Stresses, files for ParaView and pictures of a solution."""
+"""Stresses, ParaView files and pictures of a solution."""

@@ -1,4 +1,4 @@
-"""Pictures of a solution: the deformed body, whole and cut open, coloured by displacement or stress."""
+"""Pictures of a solution: the deformed body, whole and in section, coloured by displacement or stress."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from warpjld.geometry.rotations import unit
 __all__ = ["QUANTITIES", "draw"]
 
 QUANTITIES = ("displacement", "stress")
-_PANEL = 1000  # pixels, one view
-_BAR = 260  # pixels, width of the scale
+_PANEL = 1000  # width and height of one view, pixels
+_BAR = 260  # width of the colour bar, pixels
 
 
 def draw(path: Path, body: Body, instant: Instant, quantity: str, title: str = "") -> None:
-    """Write a PNG: left the outside, right the body cut through its middle, at true scale, edges of elements drawn.
+    """Write a PNG: the body from outside on the left, cut through its middle on the right, at true scale, with edges.
 
     Args:
-        path: Picture to write.
+        path: Image file to write.
         body: Mesh and laws.
         instant: The equilibrium.
-        quantity: ``displacement`` (its length [mm]) or ``stress`` (von Mises [kPa]).
+        quantity: ``displacement`` (magnitude [mm]) or ``stress`` (von Mises [kPa]).
         title: Text above.
     """
     from PIL import Image
@@ -109,13 +109,13 @@ def _bar(moved: Any, limits: tuple[float, float], label: str) -> NDArray[np.uint
 
 
 def _limits(values: Array) -> tuple[float, float]:
-    """Range of the colours: half a percent may saturate at either end, since stress peaks at single nodes."""
+    """Range of the colours: half a percent of values may saturate at either end, since stress peaks at single nodes."""
     low, high = (float(p) for p in np.percentile(values, [0.5, 99.5]))
     return (low, high) if high > low else (low, low + 1.0)
 
 
 def _view(points: Array) -> tuple[Array, Array]:
-    """Look across the longest and shortest extents, z upwards unless the body lies along it."""
+    """Viewing direction and up vector: across the longest and shortest extents, z up unless the body lies along z."""
     extent = np.ptp(points, axis=0)
     if extent[2] > 1.5 * extent[:2].max():
         return np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Stresses of a solution: Cauchy stress in the elements, smoothed to the nodes for pictures."""
+"""Cauchy stresses of a solution, in elements and averaged at nodes."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["at_nodes", "cauchy", "mises"]
 def cauchy(body: Body, displacement: Array) -> Array:
     """Cauchy stress at the centre of each element [Pa], xx yy zz xy yz zx, shape (E, 6).
 
-    The pressure is the element's own, κ (θ − 1) or κ tr ε of its mean dilatation: that of the formulation, which does
-    not oscillate within it. The divergence at the centre is another number, and κ makes much of it near ν = ½.
+    The pressure is that of the formulation, κ (θ − 1) or κ tr ε of the element's mean dilatation, which does not
+    oscillate within the element. The divergence at the centre differs, and κ magnifies the difference near ν = ½.
     """
     u = displacement.reshape(-1, 3)[body.mesh.elements]
     x = body.mesh.nodes[body.mesh.elements]
@@ -45,7 +45,7 @@ def cauchy(body: Body, displacement: Array) -> Array:
 
 
 def _mean_divergence(x: Array, u: Array) -> Array:
-    """Mean of ∇·u over elements with corners x and displacements u (E, 8, 3), as B-bar has it, shape (E,)."""
+    """Mean of ∇·u over elements with corners x and displacements u (E, 8, 3), as in B-bar elements, shape (E,)."""
     total, volume = np.zeros(len(x)), np.zeros(len(x))
     for local in slope_at(POINTS):
         jacobian = np.einsum("eai,aj->eij", x, local)
@@ -57,7 +57,7 @@ def _mean_divergence(x: Array, u: Array) -> Array:
 
 
 def mises(stress: Array) -> Array:
-    """Von Mises' equivalent stress of (…, 6)."""
+    """Von Mises equivalent stress of stresses (…, 6)."""
     xx, yy, zz, xy, yz, zx = np.moveaxis(stress, -1, 0)
     squared = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + zx**2)
     out: Array = np.sqrt(squared)

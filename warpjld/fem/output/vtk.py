@@ -1,4 +1,4 @@
-"""Results as files for ParaView: one ``.vtu`` an instant and a ``.pvd`` that lists them."""
+"""Results as ParaView files: a ``.vtu`` per instant and a ``.pvd`` that lists them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def grid_of(mesh: HexMesh) -> Any:
 
 
 def write_vtu(path: Path, body: Body, instant: Instant) -> None:
-    """One instant: nodes at rest with displacement, reaction and von Mises stress; stress and region of cells."""
+    """Write one instant: rest nodes with displacement, reaction and von Mises stress; stress and region of cells."""
     grid = grid_of(body.mesh)
     stress = cauchy(body, instant.displacement)
     point, cell = grid.point_data, grid.cell_data
@@ -43,10 +43,10 @@ def write_vtu(path: Path, body: Body, instant: Instant) -> None:
 
 
 class Series:
-    """A time series of ``.vtu`` files, readable after every instant.
+    """A time series of ``.vtu`` files that is readable after every instant.
 
     Args:
-        path: The ``.pvd``; its ``.vtu`` files lie beside it.
+        path: The ``.pvd`` file; the ``.vtu`` files are written beside it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,7 +54,7 @@ class Series:
         self._entries: list[tuple[float, str]] = []
 
     def add(self, time: float, body: Body, instant: Instant) -> Path:
-        """Write an instant and list it under ``time``."""
+        """Write an instant and list it at ``time``; returns the ``.vtu`` file."""
         name = f"{self.path.stem}_{len(self._entries):04d}.vtu"
         write_vtu(self.path.with_name(name), body, instant)
         self._entries.append((time, name))

@@ -1,9 +1,9 @@
-"""The equilibrium path beyond limit loads: arc length as the parameter, load and displacement as the unknowns.
+"""Arc-length continuation: equilibrium paths beyond limit loads, with load and displacement as unknowns.
 
-From an equilibrium (u, λ) a step of length |Δu| = s goes along the tangent u' = K⁻¹ ∂R/∂λ, in the direction in which
-the step before went, and is corrected at right angles to the way gone so far: δu = δu_R + δλ u', Δu · δu = 0, with
-K δu_R = R(u, λ) (Riks 1979, Int. J. Solids Struct. 15, 529; Ramm 1981). The load then falls beyond a limit load as it
-must.
+From an equilibrium (u, λ) a step of length |Δu| = s goes along the tangent u' = K⁻¹ ∂R/∂λ, in the direction of the
+previous step, and is corrected orthogonally to the step so far: δu = δu_R + δλ u', Δu · δu = 0, with
+K δu_R = R(u, λ) (Riks 1979, Int. J. Solids Struct. 15, 529; Ramm 1981). The load may thus decrease beyond a limit
+load.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from warpjld.fem.solver.solution import Instant, Solution
 __all__ = ["DIRECT", "follow"]
 
 DIRECT = 40_000
-"""Degrees of freedom up to which steps are solved directly, as the path's indefinite stiffness asks for."""
-_STEPS = 300  # of one curve at most
-_ITERATIONS, _FEW = 12, 4  # of one step at most; after fewer than `_FEW` the next step is longer
-_SHORTER, _LONGER, _LONGEST = 0.5, 1.5, 4.0  # factors of the step's length, and the longest in units of the first
+"""Largest number of degrees of freedom: steps need a direct solver, since the stiffness is indefinite."""
+_STEPS = 300  # largest number of steps of a path
+_ITERATIONS, _FEW = 12, 4  # largest number of iterations of a step; with at most `_FEW` the next step is longer
+_SHORTER, _LONGER, _LONGEST = 0.5, 1.5, 4.0  # factors of the step length; largest length, per first length
 _SHORTEST = 1e-4
-"""Length of a step under which the path is given up, over the first; ``_LONGEST`` likewise."""
+"""Smallest step length, per first length; below, the path is given up."""
 
 
 def follow(
     problem: Problem, first: float, tolerance: float, held: Ints, progress: Callable[[str], None] | None
 ) -> Solution:
-    """Equilibria along the path, until it reaches the full load; loads rise and fall on the way.
+    """Equilibria along the path until the full load is reached; the load may rise and fall.
 
     Args:
-        problem: What is to be in equilibrium.
-        first: Load factor that the first step is as long as.
+        problem: The problem.
+        first: Load factor that sets the length of the first step.
         tolerance: Relative residual of each equilibrium.
-        held: Degrees of freedom that were held because a body was free.
+        held: Degrees of freedom that were constrained because a body was free.
         progress: Called with a line of text after each instant.
 
     Raises:
@@ -76,20 +76,20 @@ def follow(
         if progress:
             progress(f"load {factor:.4g}: {instant.newton} Newton steps, residual {instant.residual:.1e}")
         if full:
-            text = "" if len(reached) < 2 else _turned([i.factor for i in reached])
+            text = "" if len(reached) < 2 else _limit_message([i.factor for i in reached])
             return Solution(SolveStatus.CONVERGED, tuple(reached[1:]), text or "converged", held, problem.loads)
     message = f"the path could not be followed to the full load: it got to {factor:.4g}, at most to {limit:.4g} of it"
     return Solution(SolveStatus.MAX_ITERATIONS, tuple(reached[1:] or reached), message, held, problem.loads)
 
 
-def _turned(factors: list[float]) -> str:
-    """Where the load had to fall on the way, in words."""
+def _limit_message(factors: list[float]) -> str:
+    """Message on the largest limit load on the path; empty without one."""
     peaks = [b for a, b, c in zip(factors, factors[1:], factors[2:], strict=False) if a < b > c]
     return f"converged, beyond a limit load of {max(peaks):.4g} of the load" if peaks else ""
 
 
 class _Path:
-    """Steps along the path."""
+    """Predictor and corrector of steps along the path."""
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self._problem, self._tolerance = problem, tolerance
@@ -98,11 +98,11 @@ class _Path:
         self._full[problem.prescribed.degrees] = problem.known(1.0) - problem.known(0.0)
 
     def slope(self, u: Array, factor: float) -> Array | None:
-        """∂u/∂λ at fixed residual, shape (3N,)."""
+        """Tangent ∂u/∂λ at fixed residual, shape (3N,)."""
         return self._solve(u, factor, np.zeros_like(u))[1]
 
     def _solve(self, u: Array, factor: float, residual: Array) -> tuple[Array | None, Array | None]:
-        """K⁻¹ R, and ∂u/∂λ."""
+        """Solutions K⁻¹ R and ∂u/∂λ."""
         problem = self._problem
         self._tangent = problem.body.at(u, reuse=self._tangent)
         stiffness = self._tangent.stiffness
@@ -119,7 +119,8 @@ class _Path:
     def corrected(
         self, start: Array, factor: float, way: Array, ahead: float, *, fixed: bool
     ) -> tuple[Array, float, Instant] | None:
-        """The equilibrium near a way (3N,) and a load ahead; at that load where it is fixed. None where none is."""
+        """The equilibrium near a predictor step ``way`` (3N,) and load increment ``ahead``, at that load if ``fixed``;
+        None if the iteration does not converge."""
         problem, load = self._problem, factor + ahead
         for step in range(_ITERATIONS):
             u = start + way

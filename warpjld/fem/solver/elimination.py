@@ -1,4 +1,4 @@
-"""In which order the nodes of a sparse matrix are eliminated, and the fronts that do it (see ``fem_factor``)."""
+"""Fill-reducing elimination order of a sparse matrix, and its supernodal fronts (multifrontal, see ``fem_factor``)."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ __all__ = ["Elimination", "eliminate", "work_by_profile"]
 
 _LANES = 8  # as in warpjld_kernels.fem_factor
 _NARROW = 8
-"""Nodes of a front up to which it joins the one above whatever zeros that takes, and"""
+"""Number of nodes of a front up to which it is merged with the one above, whatever explicit zeros this adds."""
 _ZEROS = 0.15
-"""share of a front's numbers that may be zeros where it joins."""
+"""Largest share of explicit zeros in a wider front at which it is merged."""
 _SHARE = 0.7
-"""Work of what is done side by side, over all; the rest is done after it."""
+"""Share of the work in fronts that are factorised in parallel; the rest follows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """An order, and fronts of it; members as in the kernel's ``Fronts`` and ``Blocks``.
+    """An elimination order and its fronts; members as in the kernel's ``Fronts`` and ``Blocks``.
 
     Attributes:
         order: Nodes in the order of elimination, shape (n,).
-        place: Place of every node in it, -1 where it takes no part, shape (N,).
+        place: Position of every node in it, -1 for inactive nodes, shape (N,).
         tables: The kernel's tables of fronts, by name.
-        early: Fronts that are done side by side, and where each part of them begins.
-        late: The others.
-        size: Numbers in the panels.
-        room: Numbers of what is left over, at once.
-        work: Multiplications.
+        early: Fronts that are factorised in parallel, and the start of each parallel part.
+        late: The remaining fronts, likewise.
+        size: Number of values in the factor's panels.
+        room: Largest number of values in update matrices at a time.
+        work: Number of multiplications.
     """
 
     order: Ints32
@@ -49,18 +49,18 @@ class Elimination:
 
 
 def eliminate(rows: Ints32, columns: Ints32, active: Mask) -> Elimination:
-    """An order of least degree (Liu 1985), and its fronts.
+    """A minimum-degree order (Liu 1985) and its fronts.
 
     Args:
-        rows: Where each row of a symmetric pattern begins, shape (N + 1,).
-        columns: Its columns.
-        active: Nodes that are eliminated, shape (N,).
+        rows: Start of each row of a symmetric pattern, shape (N + 1,).
+        columns: Its column indices.
+        active: Mask of nodes to eliminate, shape (N,).
     """
     nodes = np.flatnonzero(active)
     full = csr_array((np.ones(len(columns)), columns, rows), shape=(len(active),) * 2)
     pattern = csr_array(full[nodes][:, nodes])
     place = np.full(len(active), -1, np.int32)
-    mine, lower = _ordered(pattern)
+    mine, lower = _minimum_degree(pattern)
     place[nodes] = mine
     order = np.empty(len(nodes), np.int32)
     order[mine] = nodes
@@ -69,11 +69,11 @@ def eliminate(rows: Ints32, columns: Ints32, active: Mask) -> Elimination:
 
 
 def work_by_profile(rows: Ints32, columns: Ints32, active: Mask) -> float:
-    """Multiplications that a factor in the ordering of Cuthill and McKee would take: quickly found, and more than those
-    of an order of least degree where bodies are long or thin.
+    """Multiplications of a factorisation in Cuthill–McKee order: fast to compute, and more than in a minimum-degree
+    order for long or thin bodies.
 
     Args:
-        rows, columns, active: As of ``eliminate``.
+        rows, columns, active: As in ``eliminate``.
     """
     nodes = np.flatnonzero(active)
     full = csr_array((np.ones(len(columns), np.int8), columns, rows), shape=(len(active),) * 2)
@@ -86,8 +86,9 @@ def work_by_profile(rows: Ints32, columns: Ints32, active: Mask) -> float:
     return float(13.5 * (profile * profile).sum())
 
 
-def _ordered(pattern: Any) -> tuple[Ints32, Any]:
-    """Place of each node, and the factor's lower triangle in that order, ``csc_array``: a Laplacian's is found."""
+def _minimum_degree(pattern: Any) -> tuple[Ints32, Any]:
+    """Position of each node, and the pattern of the factor's lower triangle in that order, as ``csc_array``, obtained
+    by factorising a Laplacian."""
     count = pattern.shape[0]
     laplacian = csc_array(diags_array(pattern.sum(axis=1) + 1.0) - pattern)
     found = splu(laplacian, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0)
@@ -98,16 +99,16 @@ def _ordered(pattern: Any) -> tuple[Ints32, Any]:
 
 
 def _fronts(lower: Any) -> tuple[Ints, list[Ints32]]:
-    """First columns of the fronts, shape (F + 1,), and the rows of each, its own columns first."""
+    """First columns of the fronts, shape (F + 1,), and row indices of each, its own columns first."""
     count = lower.shape[0]
     sizes = np.diff(lower.indptr)
     second = np.full(count, count)
-    some = sizes > 1
-    second[some] = lower.indices[lower.indptr[:-1][some] + 1]
+    has_below = sizes > 1
+    second[has_below] = lower.indices[lower.indptr[:-1][has_below] + 1]
     begins = np.ones(count + 1, dtype=bool)
     begins[1:-1] = (second[:-1] != np.arange(1, count)) | (sizes[1:] != sizes[:-1] - 1)
     starts = np.flatnonzero(begins)
-    # where the next front is this one's parent they may become one
+    # merge a front with the next one if that is its parent
     kept: list[tuple[int, int, int, Ints32]] = []  # first, last column + 1, zeros, rows below
     for low, high in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
         rows = lower.indices[lower.indptr[high - 1] + 1 : lower.indptr[high]]
@@ -145,11 +146,11 @@ def _tables(order: Ints32, place: Ints32, first: Ints, lists: list[Ints32]) -> E
     for front in range(count):  # children come before their parents
         if parent[front] >= 0:
             below[parent[front]] += below[front]
-    parts = _parted(parent, below, work)
+    parts = _partition(parent, below, work)
     left, room, sizes = np.zeros(count, np.int64), 0, rest * 3 * (every - own)
-    parts = [_sequence(part, parent, sizes) for part in parts]
+    parts = [_postorder(part, parent, sizes) for part in parts]
     for part in parts:
-        room = _stacked(part, parent, sizes, left, room)
+        room = _allocate_stacks(part, parent, sizes, left, room)
     tables = {
         "first": first.astype(np.int32),
         "starts": starts.astype(np.int32),
@@ -169,8 +170,8 @@ def _padded(count: Ints) -> Ints:
     return (count + _LANES - 1) // _LANES * _LANES
 
 
-def _parted(parent: Ints, below: Any, work: Any) -> list[Ints]:
-    """Fronts of whole branches in two parts of like work, and what is above them; the same however many threads."""
+def _partition(parent: Ints, below: Any, work: Any) -> list[Ints]:
+    """Divide fronts into two parts of whole subtrees with equal work, and the fronts above; independent of threads."""
     roots = np.flatnonzero(parent < 0).tolist()
     branches, above = roots, 0.0
     total = float(work.sum())
@@ -200,8 +201,8 @@ def _parted(parent: Ints, below: Any, work: Any) -> list[Ints]:
     return [np.flatnonzero(side_of == side) for side in range(3)]
 
 
-def _sequence(part: Ints, parent: Ints, sizes: Ints) -> Ints:
-    """Fronts of a part in an order, children first, in which what waits takes least room (Liu 1986)."""
+def _postorder(part: Ints, parent: Ints, sizes: Ints) -> Ints:
+    """Postorder of a part's fronts that minimises the memory of waiting update matrices (Liu 1986)."""
     inside = np.zeros(len(parent), dtype=bool)
     inside[part] = True
     ups, size = parent.tolist(), sizes.tolist()
@@ -220,16 +221,16 @@ def _sequence(part: Ints, parent: Ints, sizes: Ints) -> Ints:
         else:
             tops.append(front)
     out, todo = [], tops
-    while todo:  # parents before children, last child first: the other way round
+    while todo:  # parents before children, last child first; reversed at the end
         front = todo.pop()
         out.append(front)
         todo += kids[front]
     return np.array(out[::-1], np.int64)
 
 
-def _stacked(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> int:
-    """Places of what fronts leave over: two stacks, for those an odd and an even number of fronts below the top, so
-    that what is used up is always on top of the other one. Returns where the stacks end."""
+def _allocate_stacks(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> int:
+    """Offsets of update matrices on two stacks, for fronts at even and odd depth, so that a front's children are always
+    on top of the other stack. Written to ``left``; returns the end of the stacks."""
     inside = np.zeros(len(parent), dtype=bool)
     inside[part] = True
     depth = np.zeros(len(parent), np.int64)
@@ -237,7 +238,7 @@ def _stacked(part: Ints, parent: Ints, sizes: Ints, left: Ints, start: int) -> i
         up = parent[front]
         depth[front] = depth[up] + 1 if up >= 0 and inside[up] else 0
     heights, tops = [0, 0], [0, 0]
-    waiting: list[list[tuple[int, int]]] = [[], []]  # fronts on a stack, and how high it was below them
+    waiting: list[list[tuple[int, int]]] = [[], []]  # fronts on each stack, and the stack's height below them
     for front in part.tolist():
         parity = int(depth[front] % 2)
         other = waiting[1 - parity]

@@ -1,4 +1,4 @@
-"""Cholesky factor of a sparse block matrix, for direct solves and as a preconditioner (see ``fem_factor``)."""
+"""Sparse Cholesky factor of a block matrix, for direct solves and as a preconditioner (see ``fem_factor``)."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ __all__ = ["Factor"]
 
 
 class Factor:
-    """L of K11 = L Lᵀ.
+    """The factor L of K11 = L Lᵀ.
 
     Args:
         matrix: Full K, float64.
-        free: Free degrees of freedom, shape (3N,).
-        threads: Threads.
-        reuse: A factor that is not needed any more: its memory is written over, and its order is kept where it has room
-            for all that this matrix has.
+        free: Mask of free degrees of freedom, shape (3N,).
+        threads: Number of threads.
+        reuse: A factor that is no longer needed: its memory is overwritten, and its order is kept if it has room for
+            all entries of this matrix.
 
     Attributes:
-        elimination: The order and the fronts.
+        elimination: The elimination order and its fronts.
 
     Raises:
         IndefiniteError: K11 is not positive definite.
@@ -36,23 +36,23 @@ class Factor:
         self._free = free
         pattern = matrix.rows, matrix.columns
         if reuse is not None and np.array_equal(reuse._free, free):
-            self._take(reuse.elimination, reuse._pattern, (reuse._panels, reuse._work))
+            self._adopt(reuse.elimination, reuse._pattern, (reuse._panels, reuse._work))
             if self._factorised(matrix, threads):
                 self._prepare()
                 return
-            pattern = _both(pattern, reuse._pattern)
+            pattern = _union(pattern, reuse._pattern)
         found = eliminate(*pattern, np.asarray(free.reshape(-1, 3).any(axis=1)))
-        self._take(found, pattern, (np.empty(found.size + 8), np.empty(found.room + 8)))
+        self._adopt(found, pattern, (np.empty(found.size + 8), np.empty(found.room + 8)))
         whole = self._factorised(matrix, threads)
         assert whole, "fronts made for a pattern have room for it"
         self._prepare()
 
-    def _take(self, elimination: Elimination, pattern: tuple[Ints32, Ints32], memory: tuple[Array, Array]) -> None:
+    def _adopt(self, elimination: Elimination, pattern: tuple[Ints32, Ints32], memory: tuple[Array, Array]) -> None:
         self.elimination, self._pattern = elimination, pattern
         self._panels, self._work = memory
 
     def _prepare(self) -> None:
-        """Record the solve."""
+        """Record the launch of the solve."""
         elimination = self.elimination
         degrees = (3 * elimination.order[:, None].astype(np.int64) + np.arange(3)).ravel()
         self._degrees = degrees
@@ -64,7 +64,7 @@ class Factor:
         self._launch = Launch(fem_factor.solve, 1, [*inputs, shared(self._x)])
 
     def solve(self, right: Array) -> Array:
-        """K11⁻¹ b, zero where prescribed, shape (3N,)."""
+        """Solution of K11 x = b, zero where prescribed, shape (3N,)."""
         self._x[:] = right[self._degrees]
         self._launch()
         out = np.zeros_like(right)
@@ -78,7 +78,7 @@ class Factor:
         return grouped(fem_factor.Fronts, **elimination.tables, todo=part[0], parts=part[1])
 
     def _factorised(self, matrix: BlockMatrix, threads: int) -> bool:
-        """Find the panels; false where the matrix has what the fronts have no room for."""
+        """Compute the panels; False if the matrix has entries outside the fronts."""
         from warpjld_kernels import fem_factor
 
         elimination = self.elimination
@@ -107,12 +107,12 @@ class Factor:
 
 
 _ROOM = 1.15
-"""Entries of an earlier pattern and the present one together, over the present one's, up to which both get room: what
-touched a moment ago will touch again."""
+"""Largest ratio of entries in the union of an earlier pattern and the present one to those in the present one, at which
+the union is used: pairs that were in contact a moment ago are likely to be in contact again."""
 
 
-def _both(pattern: tuple[Ints32, Ints32], before: tuple[Ints32, Ints32]) -> tuple[Ints32, Ints32]:
-    """Rows and columns of two patterns of one size together, unless there are far more of them than of the first."""
+def _union(pattern: tuple[Ints32, Ints32], before: tuple[Ints32, Ints32]) -> tuple[Ints32, Ints32]:
+    """Union of two patterns of the same size, or the first one if the union is much larger."""
     count = len(pattern[0]) - 1
     one, other = (
         csr_array((np.ones(len(columns), np.int8), columns, rows), shape=(count, count))

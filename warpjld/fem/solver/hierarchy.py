@@ -1,4 +1,4 @@
-"""Geometric multigrid's levels: coarser and coarser node sets of a mesh, and the prolongations between them."""
+"""Levels of geometric multigrid: node sets of increasing coarseness, and prolongations between them."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 __all__ = ["hierarchy_of"]
 
 _COARSEST = 400
-"""Nodes below which a direct solve is cheaper than another level."""
+"""Number of nodes below which a direct solve is cheaper than another level."""
 
 
 def hierarchy_of(mesh: HexMesh) -> list[Any]:
-    """Interpolation weights from each level's nodes to the next finer one's, finest first, as ``csr_array``s.
+    """Prolongations from each level's nodes to the next finer one's, finest first, as ``csr_array``s.
 
-    Structured blocks take every other line; meshes cut from a regular grid every other grid plane; any other mesh is
-    laid into a regular grid of about twice its element size, whose trilinear functions contain every rigid motion.
-    Weights depend on the numbering only, not on how nodes were moved to fit a shape. Merged meshes each keep their own.
+    Structured blocks take every other line; meshes made from a regular grid every other grid plane; any other mesh is
+    embedded in a regular grid of about twice its element size, whose trilinear functions contain all rigid motions.
+    Weights depend on the numbering only, not on nodes moved to fit a shape. Parts of merged meshes are independent.
     """
     if mesh.parts:
         return _side_by_side([hierarchy_of(part) for part in mesh.parts], [len(part.nodes) for part in mesh.parts])
@@ -66,7 +66,7 @@ def _from_blocks(blocks: tuple[Ints32, ...], count: int) -> list[Any]:
 
 
 def _side_by_side(parts: list[list[Any]], counts: list[int]) -> list[Any]:
-    """Levels of several bodies together; one that has no coarser level left is handed on as it is."""
+    """Levels of several bodies combined; a body without a further level is passed on by the identity."""
     out = []
     for level in range(max(map(len, parts))):
         weights = []
@@ -78,7 +78,7 @@ def _side_by_side(parts: list[list[Any]], counts: list[int]) -> list[Any]:
 
 
 def _kept_lines(n: int) -> Ints:
-    """Lines 0…n of a block that the coarser one keeps: every other one, the same seen from both ends."""
+    """Lines of 0…n that the coarser block keeps: every other one, symmetric from both ends."""
     if n % 2 == 0:
         return np.arange(0, n + 1, 2)
     if n == 1:
@@ -109,7 +109,7 @@ def _from_lattice(lattice: Ints32) -> list[Any]:
 
 
 def _trilinear(place: Array) -> tuple[Any, Ints32]:
-    """Weights of points in a unit grid, and the integer coordinates of the grid nodes they use."""
+    """Trilinear weights of points in a unit grid, and integer coordinates of the grid nodes used."""
     low = np.floor(place).astype(np.int64)
     share = place - low
     dims = low.max(axis=0) + 2

@@ -1,4 +1,4 @@
-"""Krylov methods that say how they ended: conjugate gradients, and generalised minimal residuals (Saad 1993)."""
+"""Krylov methods with an explicit status: conjugate gradients, and flexible GMRES (Saad 1993)."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _Operator = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class SolveStatus(Enum):
-    """How a solve ended; the value is the message for people."""
+    """How a solve ended; values are messages for the user."""
 
     CONVERGED = "converged"
     STAGNATED = "the residual stopped falling before the tolerance was reached"
-    INDEFINITE = "the stiffness is not positive definite: a body is free, unstable, or an element is turned inside out"
+    INDEFINITE = "the stiffness is not positive definite: a body is free, unstable, or an element is inverted"
     NOT_FINITE = "a number became infinite or undefined"
     MAX_ITERATIONS = "the iterations allowed were not enough"
     LIMIT_LOAD = "a limit load: beyond it no stable equilibrium was found"
-    INVERTED = "elements were turned inside out, however small the step"
+    INVERTED = "elements were inverted even by the smallest step"
     SLIDING = "slides: friction is not enough to hold it"
-    UNHELD = "nothing holds it"
-    BLOCKED = "bodies overlap where all that meets is prescribed"
-    PASSED = "bodies would pass through each other, or lie deep in one another, and nothing parts them"
+    UNHELD = "a body is not constrained"
+    BLOCKED = "bodies overlap where both sides are prescribed"
+    PASSED = "bodies would pass through each other, or overlap so far that contact cannot separate them"
     STOPPED = "stopped as asked"
 
 
@@ -41,8 +41,8 @@ class Iteration:
     Attributes:
         x: Solution, shape (n,).
         status: How it ended.
-        iterations: Iterations done.
-        residual: True residual |b − A x| / |b|, computed afresh at the end in the type of ``x``.
+        iterations: Number of iterations.
+        residual: True residual |b − A x| / |b|, recomputed at the end in the type of ``x``.
         history: Recursive residual after each iteration.
     """
 
@@ -65,17 +65,17 @@ def conjugate_gradients(
 ) -> Iteration:
     """Solve A x = b, A symmetric positive definite, to |b − A x| ≤ tolerance |b|.
 
-    The flexible (Polak–Ribière) form: the preconditioner may be rounded to float32. When the recursive residual claims
-    convergence the true one is computed, and the iteration starts again from it where they differ.
+    The flexible (Polak–Ribière) variant: the preconditioner may be rounded to float32. When the recursive residual
+    converges the true one is computed, and the iteration restarts from it if they differ.
 
     Args:
-        product: x → A x.
-        precondition: r → M r.
-        b: Right side, shape (n,).
-        start: First guess, zero by default.
-        tolerance: Relative to |b|.
-        iterations: At most so many.
-        patience: Iterations without a lower residual after which it has stagnated.
+        product: Function x → A x.
+        precondition: Function r → M r.
+        b: Right-hand side, shape (n,).
+        start: Initial guess, zero by default.
+        tolerance: Tolerance of the residual, relative to |b|.
+        iterations: Largest number of iterations.
+        patience: Number of iterations without a smaller residual that counts as stagnation.
     """
     size = norm(b)
     x = np.zeros_like(b) if start is None else start.copy()
@@ -102,7 +102,7 @@ def _cg(
     iterations: int,
     patience: int,
 ) -> SolveStatus:
-    """Iterations from x with the residual r, both written over; the history grows by one each."""
+    """Iterations from x with the residual r, both overwritten; ``history`` is appended."""
     best, since, last_true, fresh = np.inf, 0, np.inf, True
     p = q = r
     alpha = rz = 0.0
@@ -144,7 +144,7 @@ def _cg(
 
 
 _Vector = Array
-_RESTART = 80  # vectors kept by GMRES before it begins again
+_RESTART = 80  # basis vectors of GMRES before a restart
 
 
 def minimal_residuals(
@@ -155,14 +155,14 @@ def minimal_residuals(
     tolerance: float = 1e-8,
     iterations: int = 400,
 ) -> Iteration:
-    """Solve A x = b.
+    """Solve A x = b by flexible GMRES.
 
     Args:
-        product: x → A x.
-        precondition: r → M⁻¹ r; need not be the same map every time (flexible).
-        b: Right side, shape (n,).
-        tolerance: Of |b − A x| / |b|.
-        iterations: At most.
+        product: Function x → A x.
+        precondition: Function r → M⁻¹ r; may change between calls (flexible).
+        b: Right-hand side, shape (n,).
+        tolerance: Tolerance of |b − A x| / |b|.
+        iterations: Largest number of iterations.
     """
     x, size = np.zeros_like(b), norm(b)
     history: list[float] = []

@@ -1,4 +1,4 @@
-"""Solving K11 U_u = R_k − K12 U_k (B eq. 7): one solver for a mesh and its prescribed degrees of freedom."""
+"""Linear solver for K11 U_u = R_k − K12 U_k (B eq. 7), for a mesh and its prescribed degrees of freedom."""
 
 from __future__ import annotations
 
@@ -26,30 +26,30 @@ __all__ = ["METHODS", "LinearSolver"]
 METHODS = ("auto", "multigrid", "aggregation", "jacobi", "direct")
 PRECISIONS = ("float64", "float32")
 _SMALL = 1500
-"""Degrees of freedom below which ``auto`` solves directly."""
+"""Number of degrees of freedom below which ``auto`` uses a direct solver."""
 _STIFF = 0.4
-"""Poisson's ratio above which smoothing is given more work."""
+"""Poisson's ratio above which stronger smoothing is used."""
 
 
 class LinearSolver:
-    """Solves with one stiffness matrix for any number of right sides.
+    """Solves with one stiffness matrix for any number of right-hand sides.
 
     Args:
         stiffness: Full K, float64.
-        free: Free degrees of freedom, shape (3N,).
-        mesh: Where a multigrid hierarchy comes from.
-        method: ``multigrid`` (geometric where the mesh allows, otherwise on a regular grid laid around it),
+        free: Mask of free degrees of freedom, shape (3N,).
+        mesh: Mesh, for the multigrid hierarchy.
+        method: ``multigrid`` (geometric if the mesh allows it, otherwise on a regular grid around it),
             ``aggregation`` (smoothed aggregation with rigid-body modes, from pyamg), ``jacobi`` (3×3 blocks),
-            ``direct`` (a sparse Cholesky factor, or SuperLU), or ``auto``.
-        precision: ``float64``, or ``float32`` with float64 residual refinement.
-        poisson: Highest Poisson's ratio: how much smoothing pays.
-        hierarchy: Weights from an earlier solver for the same mesh.
-        reuse: An earlier solver that is not needed any more: its factor is written over.
-        definite: Whether ``direct`` insists on a positive definite matrix.
-        threads: Threads, by default all.
+            ``direct`` (sparse Cholesky factor, or SuperLU), or ``auto``.
+        precision: ``float64``, or ``float32`` with float64 iterative refinement.
+        poisson: Largest Poisson's ratio, which decides on smoothing.
+        hierarchy: Prolongations of an earlier solver for the same mesh.
+        reuse: An earlier solver that is no longer needed: its factor is overwritten.
+        definite: Whether ``direct`` requires a positive definite matrix.
+        threads: Number of threads; all by default.
 
     Raises:
-        IndefiniteError: Found while setting up.
+        IndefiniteError: Found during set-up.
         InputError: Unknown method.
     """
 
@@ -106,24 +106,24 @@ class LinearSolver:
 
     @property
     def factor(self) -> Factor | None:
-        """Its Cholesky factor, where it has one."""
+        """Its Cholesky factor, if it has one."""
         return self._factor if self.method == "direct" and isinstance(self._factor, Factor) else None
 
     def of(self, stiffness: BlockMatrix) -> LinearSolver:
-        """A solver for a matrix that differs little from this one's: the preconditioner stays, a factor does not."""
+        """A solver for a matrix close to this one: a multigrid preconditioner is kept, a factor is recomputed."""
         if self.method == "direct":
             return LinearSolver(stiffness, self.free, self._mesh, method="direct", threads=self.threads)
         return self.over(stiffness)
 
     def over(self, stiffness: BlockMatrix) -> LinearSolver:
-        """The same preconditioner, a factor included, for another matrix."""
+        """A solver for another matrix with the same preconditioner or factor."""
         out = copy(self)
         out._stiffness = stiffness
         out._product = _Product(stiffness, self.threads)
         return out
 
     def solve(self, b: Array, *, tolerance: float = 1e-8, iterations: int = 4000) -> Iteration:
-        """U_u for a right side of which only the free part counts, shape (3N,); zero where prescribed."""
+        """U_u for a right-hand side (3N,), of which only the free part is used; zero where prescribed."""
         right = b * self._mask
         if self.method == "direct":
             return self._direct(right)
@@ -136,8 +136,8 @@ class LinearSolver:
     def solve_nonsymmetric(
         self, nonsymmetric: Any, b: Array, *, tolerance: float = 1e-8, iterations: int = 400
     ) -> Iteration:
-        """(K11 + E11) x = b with an E (3N, 3N) that need not be symmetric nor definite, by minimal residuals; what
-        preconditions K preconditions the sum.
+        """Solution of (K11 + E11) x = b by flexible GMRES, for a matrix E (3N, 3N) that may be nonsymmetric and
+        indefinite; preconditioned as K is.
         """
         right = b * self._mask
         mask = self._mask
@@ -151,13 +151,13 @@ class LinearSolver:
         return minimal_residuals(product, precondition, right, tolerance=tolerance, iterations=iterations)
 
     def masked_product(self, x: NDArray[Any]) -> NDArray[Any]:
-        """K11 x."""
+        """Product K11 x."""
         y = self._product(x)
         y *= self._mask
         return y
 
     def _refined(self, b: Array, tolerance: float, iterations: int) -> Iteration:
-        """float32 iterations to 1e-2, the residual recomputed in float64, again until done."""
+        """Iterative refinement: float32 iterations to 1e-2 with residuals in float64."""
         single = self._stiffness.masked(self.free, np.float32)
         product = _Product(single, self.threads)
         x = np.zeros_like(b)
@@ -210,7 +210,7 @@ class LinearSolver:
 
 
 class _Product:
-    """x → A x through fixed buffers."""
+    """Product x → A x with preallocated buffers."""
 
     def __init__(self, matrix: BlockMatrix, threads: int) -> None:
         from warpjld_kernels import fem_blocks
@@ -229,7 +229,7 @@ class _Product:
 
 
 class _General:
-    """LU factors of a matrix that need not be positive definite."""
+    """LU factors of a matrix that may be indefinite."""
 
     def __init__(self, stiffness: BlockMatrix, free: Mask) -> None:
         inside = stiffness.to_scipy().tocsr()[free][:, free].tocsc()
@@ -241,7 +241,7 @@ class _General:
         self._free = free
 
     def solve(self, right: Array) -> Array:
-        """K11⁻¹ b, zero where prescribed, shape (3N,)."""
+        """Solution of K11 x = b, zero where prescribed, shape (3N,)."""
         x = np.zeros_like(right)
         x[self._free] = self._factor.solve(right[self._free])
         return x

@@ -1,7 +1,7 @@
-"""Multigrid as a preconditioner: Galerkin coarse operators, Chebyshev smoothing, a direct solve on the coarsest level.
+"""Multigrid preconditioner: Galerkin coarse operators, Chebyshev smoothing, a direct solve on the coarsest level.
 
-Built in float64, applied in float32 (or float64): a preconditioner need not be exact, and half the bytes are half the
-time. The cycle is symmetric and positive, so it preconditions conjugate gradients.
+Set up in float64, applied in float32 (or float64): a preconditioner need not be exact, and half the memory traffic is
+half the time. The cycle is symmetric and positive definite, as conjugate gradients require.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ __all__ = ["Aggregation", "Multigrid", "coarse_matrix", "restriction"]
 
 
 def coarse_matrix(fine: BlockMatrix, free: Mask, weights: Any, transposed: Any, *, threads: int) -> BlockMatrix:
-    """Pᵀ K11 P, float64.
+    """Galerkin coarse operator Pᵀ K11 P, float64.
 
     Args:
-        fine: Full matrix K, N blocks a side.
-        free: Free degrees of freedom, shape (3N,); the others do not take part.
-        weights: P, one weight for the three values of a node, ``csr_array`` (N, n).
+        fine: Full matrix K, N block rows.
+        free: Mask of free degrees of freedom, shape (3N,); others are left out.
+        weights: Prolongation P with one weight for the three components of a node, ``csr_array`` (N, n).
         transposed: Pᵀ, see ``restriction``.
-        threads: Threads.
+        threads: Number of threads.
     """
     from warpjld_kernels import fem_galerkin
 
@@ -55,7 +55,7 @@ def coarse_matrix(fine: BlockMatrix, free: Mask, weights: Any, transposed: Any, 
 
 
 def restriction(weights: Any) -> Any:
-    """Pᵀ in rows, with the indices that the kernels want."""
+    """Pᵀ as ``csr_array`` with 32-bit indices, as the kernels need them."""
     out = weights.T.tocsr()
     out.indices = out.indices.astype(np.int32)
     out.indptr = out.indptr.astype(np.int32)
@@ -64,7 +64,7 @@ def restriction(weights: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """A level's launches: before the coarser level, and after it; ``x`` is where the result is."""
+    """Launches of a level, before and after the coarser level; ``b`` is its input, ``x`` its result."""
 
     before: list[Launch]
     after: list[Launch]
@@ -73,16 +73,16 @@ class _Level:
 
 
 class Multigrid:
-    """One symmetric V-cycle z = M r.
+    """A symmetric V-cycle z = M r.
 
     Args:
         stiffness: Full matrix K, float64.
-        free: Free degrees of freedom, shape (3N,).
-        hierarchy: Interpolation weights, finest first (see ``hierarchy_of``).
-        degree: Chebyshev degree before and after each coarse correction.
-        spread: Highest over lowest eigenvalue that smoothing takes care of.
+        free: Mask of free degrees of freedom, shape (3N,).
+        hierarchy: Prolongations, finest first (see ``hierarchy_of``).
+        degree: Degree of the Chebyshev smoother before and after each coarse correction.
+        spread: Ratio of the largest to the smallest eigenvalue that smoothing is made for.
         precision: ``float32`` or ``float64``.
-        threads: Threads, by default all.
+        threads: Number of threads; all by default.
 
     Raises:
         IndefiniteError: A coarse operator is not positive definite.
@@ -175,7 +175,7 @@ class Multigrid:
         return len(self._levels) + 1
 
     def __call__(self, r: NDArray[Any]) -> NDArray[Any]:
-        """z = M r, shape (3N,), in the type of ``r``."""
+        """Apply the preconditioner: z = M r, shape (3N,), in the type of ``r``."""
         if not self._levels:
             return self._coarsest.solve(r).astype(r.dtype)
         self._levels[0].b[:] = r
@@ -190,7 +190,7 @@ class Multigrid:
 
 
 class _Coarsest:
-    """Banded Cholesky of the coarsest level, in the ordering of Cuthill and McKee."""
+    """Banded Cholesky factor of the coarsest level, in Cuthill–McKee order."""
 
     def __init__(self, matrix: BlockMatrix, free: Mask) -> None:
         self.size = matrix.size
@@ -219,12 +219,12 @@ class _Coarsest:
 
 
 class Aggregation:
-    """One V-cycle of smoothed aggregation.
+    """A V-cycle of smoothed aggregation.
 
     Args:
         stiffness: Full K, float64.
-        free: Free degrees of freedom, shape (3N,).
-        nodes: Rest positions [m], shape (N, 3): what the rigid-body modes are made of.
+        free: Mask of free degrees of freedom, shape (3N,).
+        nodes: Rest positions [m], shape (N, 3), for the rigid-body modes.
     """
 
     def __init__(self, stiffness: BlockMatrix, free: Mask, nodes: Array) -> None:
@@ -235,7 +235,7 @@ class Aggregation:
         matrix = stiffness.masked(free)
         diagonal = np.einsum("nii->ni", matrix.diagonal())
         on = matrix.on_diagonal
-        # prescribed degrees of freedom stay in the blocks, uncoupled
+        # prescribed degrees of freedom stay in the matrix, decoupled by a diagonal entry
         matrix.values[on[:, None], [0, 1, 2], [0, 1, 2]] += ~free.reshape(-1, 3) * diagonal.max()
         modes = rigid_modes(nodes) * free[:, None]
         n = 3 * matrix.size
@@ -246,6 +246,6 @@ class Aggregation:
         self._apply = self._levels.aspreconditioner(cycle="V")
 
     def __call__(self, r: NDArray[Any]) -> NDArray[Any]:
-        """z = M r, shape (3N,)."""
+        """Apply the preconditioner: z = M r, shape (3N,)."""
         result: NDArray[Any] = (self._apply @ r.astype(np.float64)) * self._free
         return result.astype(r.dtype)

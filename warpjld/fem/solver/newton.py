@@ -1,4 +1,4 @@
-"""Newton's method through load instants: full steps where they go, searched and halved ones where they do not (R99)."""
+"""Newton's method through load increments, with line search and step halving where full steps fail (R99)."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from warpjld.fem.solver.solution import Instant, Solution
 
 __all__ = ["Newton"]
 
-_HALVINGS = 8  # of a load step at most
-_ITERATIONS, _CAUTIOUS = 16, 25  # of one step; more are allowed where steps are damped from the start
-_LINE_SEARCH = 8  # halvings of a Newton step: 1/256
+_HALVINGS = 8  # largest number of halvings of a load step
+_ITERATIONS, _CAUTIOUS = 16, 25  # largest number of iterations of a step: full Newton steps, and with line search
+_LINE_SEARCH = 8  # largest number of trial lengths of a Newton step, halved each
 _ROUNDING, _PLACES = 1e-13, 0.03
 """As in ``contact.solver.newton_state``."""
 _DIRECT = 40_000
-"""Degrees of freedom up to which a step with an indefinite stiffness is solved directly."""
+"""Number of degrees of freedom up to which a step with an indefinite stiffness is solved directly."""
 
 _BRACKET = 2e-3
-"""How narrowly a limit load is found, over itself."""
+"""Relative accuracy of a limit load."""
 _SEED, _TESTED = 7, 1e-4
-"""Of the load that asks whether an equilibrium is stable, and how exactly it is answered."""
+"""Seed of the random load for the stability test, and tolerance of its solve."""
 
 Progress = Callable[[str], None]
 
 
 class Newton:
-    """Newton's method with line search.
+    """Newton's method with optional line search.
 
     Args:
-        problem: What is to be in equilibrium.
+        problem: The problem.
         tolerance: Relative residual of each equilibrium.
-        guess: First guess of the displacement at the full load [m], shape (N, 3).
+        guess: Initial guess of the displacement at the full load [m], shape (N, 3).
     """
 
     def __init__(self, problem: Problem, tolerance: float, guess: Array | None = None) -> None:
@@ -48,7 +48,7 @@ class Newton:
         self._indefinite = False
 
     def run(self, steps: list[float], held: Ints, progress: Progress | None) -> Solution:
-        """Instant after instant; one that fails is tried again at half the step."""
+        """Find the equilibria at all load factors; a step that fails is halved."""
         u = self._problem.start.copy()
         reached: list[Instant] = []
         factor, halvings, beyond = 0.0, 0, np.inf
@@ -81,17 +81,17 @@ class Newton:
             if halvings > _HALVINGS or beyond - factor < _BRACKET * factor:
                 message = f"no equilibrium found above load {factor:.4g} (tried {target:.4g}): {status.value}"
                 if beyond < np.inf:
-                    status, message = SolveStatus.LIMIT_LOAD, _limit(factor, beyond)
-                some = tuple(reached) or (self._problem.beginning(),)
-                return Solution(status, some, message, held, self._problem.loads)
+                    status, message = SolveStatus.LIMIT_LOAD, _limit_message(factor, beyond)
+                instants = tuple(reached) or (self._problem.beginning(),)
+                return Solution(status, instants, message, held, self._problem.loads)
             if progress:
                 progress(f"load {target:.3g}: {status.value}; halving the step")
             todo.insert(0, 0.5 * (factor + target))
         return Solution(SolveStatus.CONVERGED, tuple(reached), SolveStatus.CONVERGED.value, held, self._problem.loads)
 
     def _stable(self, found: Instant, target: float) -> bool:
-        """Whether the tangent of an equilibrium is positive definite: a shell beyond its limit pressure balances as
-        well, as a pencil does on its tip. A load without any symmetry asks for every mode there is."""
+        """Whether the tangent of an equilibrium is positive definite, that is, whether it is stable. Tested by a solve
+        with a random load, which excites every mode."""
         problem, u = self._problem, found.displacement.reshape(-1)
         tangent = self._tangent = problem.body.at(u, reuse=self._tangent)
         stiffness = tangent.stiffness
@@ -105,26 +105,26 @@ class Newton:
         return done.status is not SolveStatus.INDEFINITE
 
     def _from_guess(self, target: float) -> tuple[SolveStatus, Instant | None]:
-        """The full load's equilibrium from a first guess of it, where there is one."""
+        """Equilibrium at the full load from the initial guess, if there is one."""
         if self._guess is None or target != 1.0:
             return SolveStatus.STAGNATED, None
         u = self._guess.astype(np.float64).reshape(-1)
         u[self._problem.prescribed.degrees] = self._problem.known(target)
         if not (self._problem.body.at(u, stiffness=False).lowest > 0).all():
             return SolveStatus.INVERTED, None
-        # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
-        # equilibrium before do not
+        # pressures of the start, since the guess compresses single elements, whose spurious pressures would make K
+        # indefinite
         pressures = self._problem.body.at(self._problem.start, stiffness=False).pressures
         return self._equilibrium(u, target, cautious=False, guessed=pressures)
 
     def _equilibrium(
         self, u: Array, target: float, *, cautious: bool, guessed: Array | None = None
     ) -> tuple[SolveStatus, Instant | None]:
-        """Newton's method at one load.
+        """Newton's method at one load factor.
 
-        Full steps first: in slender and nearly incompressible bodies the residual rises before it falls, and a search
-        that forbids it would creep. Only steps that turn elements inside out are shortened. ``cautious`` then insists
-        on a falling residual.
+        Full steps first: in slender and nearly incompressible bodies the residual increases before it decreases, and a
+        line search on it would make tiny steps. Only steps that invert elements are shortened. With ``cautious`` the
+        residual must decrease.
         """
         body, free = self._problem.body, self._problem.free
         u = u.copy()
@@ -142,11 +142,11 @@ class Newton:
             self._problem.subtract_pressure(stiffness, target, u)
             residual = np.where(free, external - tangent.forces, 0.0)
             now = norm(residual)
-            # forces of a guess that is off are no measure of those in equilibrium
+            # forces of an inaccurate guess are no scale for equilibrium
             start = max(start, now) if step == 0 and guessed is None else start
             scale = max(start, norm(external), norm(np.where(free, 0.0, tangent.forces - external)), 1e-300)
             moved = not jump.any()
-            # a body that is carried along as a whole ends without a force: of stiffness times place, this much is noise
+            # for a body moved rigidly all forces vanish: rounding errors scale with stiffness times displacement
             stiff = np.einsum("nii->n", stiffness.diagonal()) / 3.0
             noise = _ROUNDING * (norm(np.repeat(stiff, 3) * u) + _PLACES * norm(stiff) * body.mesh.size)
             if moved and now <= max(self._tolerance * scale, noise):
@@ -174,7 +174,7 @@ class Newton:
     def _line_search(
         self, u: Array, direction: Array, target: float, before: float | None
     ) -> tuple[float, SolveStatus]:
-        """Longest of 1, ½, ¼ … that keeps elements upright and, where ``before`` is given, lowers the residual."""
+        """Longest step of 1, ½, ¼ … without inverted elements and, if ``before`` is given, with a smaller residual."""
         length, best = 1.0, (np.inf, 0.0)
         upright = False
         for _ in range(_LINE_SEARCH):
@@ -199,8 +199,8 @@ class Newton:
         return 0.0, SolveStatus.STAGNATED
 
     def _step(self, stiffness: BlockMatrix, right: Array, tolerance: float) -> Iteration:
-        """One Newton step. On the way to a stable equilibrium K may be indefinite for a while (a slender body pushed
-        before it has turned): conjugate gradients cannot pass there, a direct solve of moderate size can.
+        """A Newton step. On the way to a stable equilibrium K may be temporarily indefinite (a slender body before it
+        has rotated): conjugate gradients fail then, but a direct solve of moderate size does not.
         """
         try:
             done = self._problem.solver(stiffness).solve(right, tolerance=tolerance)
@@ -212,7 +212,7 @@ class Newton:
         return done
 
 
-def _limit(factor: float, target: float) -> str:
+def _limit_message(factor: float, target: float) -> str:
     return (
         f"limit load: above {factor:.4g} of the load (tried {target:.4g}) no stable equilibrium was found: the body "
         "buckles, snaps through or collapses there"

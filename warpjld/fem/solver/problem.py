@@ -1,4 +1,4 @@
-"""Static problem of a body at load instants: prescribed displacements, loads, solver (B eq. 5, R107)."""
+"""Static problem of a body: prescribed displacements and loads as functions of a load factor (B eq. 5, R107)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Problem"]
 
 
 class Problem:
-    """Equilibrium of a body, from one that is known or from rest.
+    """Static problem of a body, starting at rest or at a given equilibrium.
 
     Args:
         body: Mesh and laws.
@@ -29,8 +29,8 @@ class Problem:
         precision: Its precision.
 
     Attributes:
-        start: Displacement that loading begins with [m], shape (3N,).
-        free: Degrees of freedom that are not prescribed, shape (3N,).
+        start: Initial displacement [m], shape (3N,).
+        free: Mask of degrees of freedom that are not prescribed, shape (3N,).
     """
 
     def __init__(
@@ -54,12 +54,12 @@ class Problem:
         self._hierarchy: list[Any] | None = None
 
     def known(self, factor: float) -> Array:
-        """Prescribed displacements at an instant, from where they started, shape (n,)."""
+        """Prescribed displacements at a load factor, interpolated from the start, shape (n,)."""
         start: Array = self.start[self.prescribed.degrees]
         return start + factor * (self.prescribed.values - start)
 
     def external(self, factor: float, u: Array | None) -> Array:
-        """Nodal forces at an instant, at a displacement (at rest for linear laws), shape (3N,)."""
+        """Nodal forces at a load factor and displacement (at rest for linear laws), shape (3N,)."""
         forces = factor * external_forces(self.body, self.loads, u)
         if self.after is not None and factor != 1.0:
             before = external_forces(self.body, self.after.loads, u) + self.after.reactions.reshape(-1)
@@ -67,16 +67,16 @@ class Problem:
         return forces
 
     def subtract_pressure(self, stiffness: BlockMatrix, factor: float, u: Array) -> None:
-        """Take from a stiffness what pressures add to it as the surface turns."""
+        """Subtract the load stiffness of follower pressures, in place."""
         subtract_pressure_stiffness(stiffness, self.body, self.loads, u, factor)
         if self.after is not None and factor != 1.0:
             subtract_pressure_stiffness(stiffness, self.body, self.after.loads, u, 1.0 - factor)
 
     def solver(self, stiffness: BlockMatrix) -> LinearSolver:
-        """Of a stiffness at any displacement.
+        """A linear solver for a tangent stiffness.
 
         Raises:
-            IndefiniteError: Found while setting up.
+            IndefiniteError: Found during set-up.
         """
         solver = LinearSolver(
             stiffness, self.free, self.body.mesh, hierarchy=self._hierarchy, method=self._method, **self._options
@@ -85,14 +85,14 @@ class Problem:
         return solver
 
     def direct_solver(self, stiffness: BlockMatrix) -> LinearSolver:
-        """By factors, of a stiffness that need not be positive definite."""
+        """A direct solver for a stiffness that may be indefinite."""
         return LinearSolver(stiffness, self.free, self.body.mesh, definite=False, method="direct", **self._options)
 
     def reactions(self, forces: Array) -> Array:
-        """What internal less external forces (3N,) are where displacements are prescribed, shape (N, 3)."""
+        """Internal minus external forces (3N,) at prescribed degrees of freedom, zero elsewhere, shape (N, 3)."""
         return np.where(self.free, 0.0, forces).reshape(-1, 3)
 
     def beginning(self) -> Instant:
-        """What was there before any load."""
+        """The state before any load."""
         reactions = np.zeros((self.body.degrees // 3, 3)) if self.after is None else self.after.reactions
         return Instant(0.0, self.start.reshape(-1, 3), reactions, 0, 0, 0.0)

@@ -1,4 +1,4 @@
-"""Smoothing: inverted diagonal blocks, Chebyshev's coefficients, and the highest eigenvalue they are made for."""
+"""Chebyshev smoothing: inverted diagonal blocks, coefficients, and an estimate of the largest eigenvalue."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["block_inverse", "chebyshev_steps", "highest_eigenvalue"]
 
 
 def block_inverse(matrix: BlockMatrix, free: Mask | None = None) -> Array:
-    """Inverses of the diagonal blocks, zero where a degree of freedom is prescribed or has no stiffness, (N, 3, 3).
+    """Inverses of the diagonal blocks, zero for prescribed degrees of freedom or zero stiffness, shape (N, 3, 3).
 
     Raises:
         IndefiniteError: A diagonal block with a negative stiffness.
@@ -39,8 +39,8 @@ def block_inverse(matrix: BlockMatrix, free: Mask | None = None) -> Array:
 def chebyshev_steps(degree: int, low: float, high: float) -> list[tuple[float, float]]:
     """Momentum and scale of each step of the Chebyshev polynomial over [low, high].
 
-    With step ← momentum · step + scale · (b − A x) and x ← x + step, from x = 0, the error's part of eigenvalue λ is
-    multiplied by T(c(λ)) / T(c(0)), T Chebyshev's polynomial of that degree and c(λ) = (low + high − 2λ)/(high − low).
+    With step ← momentum · step + scale · (b − A x) and x ← x + step, from x = 0, the error component of eigenvalue λ is
+    multiplied by T(c(λ)) / T(c(0)), T the Chebyshev polynomial of this degree, c(λ) = (low + high − 2λ)/(high − low).
     """
     centre, half = 0.5 * (high + low), 0.5 * (high - low)
     sigma = centre / half
@@ -54,16 +54,16 @@ def chebyshev_steps(degree: int, low: float, high: float) -> list[tuple[float, f
 
 
 def highest_eigenvalue(matrix: BlockMatrix, inverse: NDArray[Any], threads: int, rounds: int = 16) -> float:
-    """Highest eigenvalue of D⁻¹A, from a fixed start: Lanczos, by way of conjugate gradients' coefficients.
+    """Largest eigenvalue of D⁻¹A by the Lanczos method, from the coefficients of conjugate gradients; deterministic.
 
-    A few badly shaped elements make a few high eigenvalues far apart from the rest; the power method finds them too
-    late, and a smoother that does not know them amplifies them.
+    A few badly shaped elements cause a few large, isolated eigenvalues; power iteration finds them too slowly, and a
+    smoother that underestimates them amplifies their modes.
 
     Args:
-        matrix: A, symmetric, no eigenvalue of it below zero.
+        matrix: A, symmetric positive semidefinite.
         inverse: Inverted diagonal blocks D⁻¹, shape (N, 3, 3), in the matrix's type.
-        threads: Threads.
-        rounds: Most steps.
+        threads: Number of threads.
+        rounds: Largest number of steps.
     """
     kind = matrix.values.dtype
     rng = np.random.default_rng(0)

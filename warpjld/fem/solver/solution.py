@@ -1,4 +1,4 @@
-"""Results of a static solve: equilibria, and how it ended."""
+"""Results of a static solve: equilibria and status."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Instant:
     Attributes:
         factor: Share of the loads and prescribed displacements, 1 at the end.
         displacement: U [m], shape (N, 3).
-        reactions: Forces that hold the prescribed degrees of freedom [N], zero elsewhere, shape (N, 3) (B eq. 8).
-        newton: Newton iterations (1 for a linear solve).
-        iterations: Iterations of the linear solver, all together.
+        reactions: Reactions at prescribed degrees of freedom [N], zero elsewhere, shape (N, 3) (B eq. 8).
+        newton: Number of Newton iterations (1 for a linear solve).
+        iterations: Total number of iterations of the linear solver.
         residual: True residual |R − K U| over |R| of the free degrees of freedom, float64.
     """
 
@@ -33,20 +33,20 @@ class Instant:
     residual: float
 
     def __repr__(self) -> str:
-        told = f"{self.newton} Newton iterations, residual {self.residual:.1e}"
-        return f"Instant(load {self.factor:.3f}, {len(self.displacement)} nodes, {told})"
+        summary = f"{self.newton} Newton iterations, residual {self.residual:.1e}"
+        return f"Instant(load {self.factor:.3f}, {len(self.displacement)} nodes, {summary})"
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Equilibria reached, the last one first in importance.
+    """Equilibria found by a static solve.
 
     Attributes:
         status: How the solve ended.
-        instants: Every equilibrium reached, in order.
-        message: For people: what ended it.
-        held: Degrees of freedom that were held because a body was free.
-        loads: The loads, at full strength.
+        instants: Every equilibrium found, in order.
+        message: How it ended, for the user.
+        held: Degrees of freedom that were constrained because a body was free.
+        loads: The loads at full strength.
     """
 
     status: SolveStatus
@@ -80,7 +80,7 @@ class Solution:
 
 
 class SolveError(WarpjldError):
-    """A solve that did not reach the full load. ``solution`` holds what was reached."""
+    """A solve did not reach the full load; ``solution`` holds the equilibria found."""
 
     def __init__(self, solution: Solution) -> None:
         self.solution = solution

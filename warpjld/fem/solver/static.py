@@ -1,4 +1,4 @@
-"""Static equilibrium K U = R: linear solves, or Newton's method through load instants (B eq. 5, R99, R107)."""
+"""Static equilibrium K U = R: linear solves, or Newton's method through load increments (B eq. 5, R99, R107)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from warpjld.runtime.threads import one_blas_thread
 __all__ = ["solve"]
 
 _ARC = 0.1
-"""Load factor that the first step along a path is as long as, where nothing else is said."""
+"""Load factor that sets the length of the first arc-length step by default."""
 FREE = ("refuse", "hold")
 
 
@@ -50,26 +50,26 @@ def solve(
         body: Mesh and laws.
         prescribed: Known displacements.
         loads: Known forces.
-        after: Equilibrium to start from: loads and prescribed displacements go from what they were there to what is
-            given here, and degrees of freedom that are released let go of their reactions gradually.
-        guess: First guess of the displacement at the full load [m], shape (N, 3): where Newton's method for that
-            instant starts, if no element is inside out there. Linear laws need none.
-        instants: Load instants, as a number of equal steps or as rising factors that end with 1; steps that fail are
-            halved. One is enough for linear laws.
-        free: What to do with a body that can move as a whole: ``refuse`` it, or ``hold`` it by as few degrees
-            of freedom as possible (``held_in_place`` states the rule).
+        after: Equilibrium to start from: loads and prescribed displacements change from those there to the given ones,
+            and reactions at released degrees of freedom are reduced gradually.
+        guess: Initial guess of the displacement at the full load [m], shape (N, 3): start of Newton's method for that
+            instant, unless it inverts elements. Not needed for linear laws.
+        instants: Load increments, as a number of equal steps or as increasing factors that end with 1; steps that fail
+            are halved. One is enough for linear laws.
+        free: What to do with a body with free rigid motions: ``refuse`` it, or ``hold`` it by a minimal number of
+            constraints (see ``held_in_place``).
         method: Linear solver (see ``LinearSolver``).
         precision: ``float64``, or ``float32`` refined to float64 residuals.
         tolerance: Relative residual of each equilibrium.
-        arc_length: Follow the equilibrium path beyond limit loads, where a body buckles or snaps through and loads
-            fall on the way to the full load; equilibria on it need not be stable. The first of ``instants`` says how
-            long its steps are.
-        check: Raise when the full load is not reached; otherwise return the status.
+        arc_length: Follow the equilibrium path beyond limit loads, where a body buckles or snaps through and the load
+            decreases on the way to the full load; equilibria on the path may be unstable. The first of ``instants``
+            sets the length of steps.
+        check: Whether to raise if the full load is not reached, instead of returning the status.
         progress: Called with a line of text after each instant.
 
     Raises:
         InputError: Wrong arguments, or a free body (``FreeBodyError``).
-        SolveError: The full load was not reached; its ``solution`` has what was.
+        SolveError: The full load was not reached; its ``solution`` holds the equilibria found.
     """
     if free not in FREE:
         raise InputError(f"free: want {' or '.join(FREE)}, got '{free}'")
@@ -95,7 +95,11 @@ def solve(
 
 
 def _held(body: Body, prescribed: Prescribed, after: Solution | None, free: str) -> tuple[Prescribed, Ints]:
-    """Prescribed displacements with those that hold free bodies, and which these are; or free bodies refused."""
+    """Prescribed displacements with constraints of free bodies added, and the latter's degrees of freedom.
+
+    Raises:
+        FreeBodyError: A free body, with ``free="refuse"``.
+    """
     if free == "refuse":
         refuse_free(body, prescribed)
         return prescribed, np.empty(0, np.int64)
@@ -110,7 +114,7 @@ def _held(body: Body, prescribed: Prescribed, after: Solution | None, free: str)
 def _linear(
     problem: Problem, steps: list[float], tolerance: float, held: Ints, progress: Callable[[str], None] | None
 ) -> Solution:
-    """K is the same at every instant: one set-up, and a solve each."""
+    """Solution with linear laws: K is constant, so a single set-up serves all instants."""
     body = problem.body
     rest = body.at()
     stiffness = rest.stiffness

@@ -1,1 +1,1 @@
-"""Studies: a deformable body and load steps, read from TOML files, with their results in a folder."""
+"""Finite-element studies: a deformable body and load steps from a TOML file, results in a folder."""

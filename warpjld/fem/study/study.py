@@ -1,4 +1,4 @@
-"""A study: a deformable body, and load steps one after another."""
+"""A study: a deformable body and a sequence of load steps."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["FemStudy", "Step", "StudyInstant", "Support"]
 
 @dataclass(frozen=True)
 class Support:
-    """Prescribed displacements of a set, or planes that it is brought onto.
+    """Prescribed displacements of a node set, or planes that it is moved to.
 
     Attributes:
         where: Node set or face set.
-        moves: Displacement along some axes [m], by the axis's number.
-        onto: Coordinate to be reached along some axes [m], likewise.
+        moves: Displacement along some axes [m], by axis index.
+        onto: Target coordinate along some axes [m], by axis index.
     """
 
     where: str
@@ -33,10 +33,10 @@ class Support:
     onto: Mapping[int, float] = field(default_factory=dict)
 
     def on(self, mesh: HexMesh) -> Prescribed:
-        """The displacements of a mesh's nodes.
+        """The prescribed displacements of a mesh's nodes.
 
         Raises:
-            InputError: There is no such set.
+            InputError: Unknown set.
         """
         nodes = mesh.node_set(self.where)
         target = np.full((len(nodes), 3), np.nan)
@@ -49,14 +49,14 @@ class Support:
 
 @dataclass(frozen=True)
 class Step:
-    """Loads and prescribed displacements that are reached together.
+    """Loads and prescribed displacements that are applied together.
 
     Attributes:
-        name: For tables and pictures.
-        loads: At the end of the step.
+        name: Name in tables and pictures.
+        loads: Loads at the end of the step.
         prescribed: Displacements at the end of the step.
         instants: Number of load instants.
-        free: What becomes of a body that could move as a whole: ``refuse`` or ``hold``.
+        free: Treatment of bodies with free rigid motions: ``refuse`` or ``hold``.
     """
 
     name: str
@@ -72,10 +72,10 @@ class StudyInstant:
 
     Attributes:
         step: The step it belongs to.
-        time: Steps done so far, this one's share included.
+        time: Number of steps completed, including the share of this one.
         instant: The equilibrium.
-        solution: That of the whole step.
-        held: Prescribed degrees of freedom by the set they were given for.
+        solution: Solution of the whole step.
+        held: Prescribed degrees of freedom, by the set they were given for.
     """
 
     step: Step
@@ -87,15 +87,15 @@ class StudyInstant:
 
 @dataclass(frozen=True, eq=False)
 class FemStudy:
-    """A body and what is done to it (see ``load_study``).
+    """A body and its load steps (see ``load_study``).
 
     Attributes:
-        title: For people.
+        title: Title for the user.
         body: Mesh and materials.
         steps: Load steps in order.
         method: Linear solver.
         precision: Its precision.
-        notes: What was found while meshing, for people.
+        notes: Information on meshing, for the user.
     """
 
     title: str
@@ -106,7 +106,7 @@ class FemStudy:
     notes: tuple[str, ...] = ()
 
     def run(self, progress: Callable[[str], None] | None = None) -> Iterator[StudyInstant]:
-        """Equilibria in order, as whole steps are done; the last one's solution may not have converged."""
+        """Equilibria in order, step by step; ends after a step that does not converge."""
         after: Solution | None = None
         for number, step in enumerate(self.steps):
             known = Prescribed(np.empty(0, np.int64), np.empty(0))

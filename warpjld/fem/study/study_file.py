@@ -1,4 +1,4 @@
-"""Studies from TOML files, whose tables and keys ``docs/reference/fem-study.md`` lists."""
+"""Reader of study files (TOML), whose tables and keys are listed in ``docs/reference/fem-study.md``."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _LAWS: dict[str, tuple[Callable[..., Material], tuple[str, ...]]] = {
     "mooney-rivlin": (MooneyRivlin, ("c10", "c01")),
     "fung": (Fung, ("young", "stiffening")),
 }
-"""Laws, and the constants they cannot do without."""
+"""Name of each law → its constructor and required constants."""
 
 _AXES = ("x", "y", "z")
 
@@ -47,7 +47,7 @@ def load_study(path: str | Path) -> FemStudy:
     """Read and check a study file.
 
     Raises:
-        InputError: Not TOML, or an entry that is unknown, missing or wrong: file, line and entry named.
+        InputError: Not TOML, or an entry that is unknown, missing or invalid, with file, line and entry.
     """
     top = read_toml(path)
     top.needed("mesh", "material", "step")
@@ -79,7 +79,7 @@ def load_study(path: str | Path) -> FemStudy:
 
 
 def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
-    """The mesh, and what was found while making it."""
+    """The mesh, and notes on its making."""
     table.needed("kind")
     kind = table.text("kind", known=(*_MESHES, "surface", "file"))
     if kind in _MESHES:
@@ -111,7 +111,7 @@ def _mesh(table: TomlTable) -> tuple[HexMesh, tuple[str, ...]]:
 
 
 def _most_elements(kind: str, options: dict[str, Any]) -> float:
-    """About how many elements a mesh of these options has, before any is made."""
+    """Approximate number of elements that a mesh with these options would have."""
     if kind == "box":
         return math.prod(float(count) for count in options["counts"])
     n = float(options["n"])
@@ -137,7 +137,7 @@ def _material(table: TomlTable) -> Material:
 
 
 def _nodes(mesh: HexMesh, table: TomlTable) -> Ints32:
-    """Nodes of a set, cut by planes."""
+    """Nodes of a set, restricted by planes."""
     nodes = mesh.node_set(table.text("of", "surface") or "")
     for key, sign in (("above", 1.0), ("below", -1.0)):
         for axis, value in _along_axes(table.table(key)).items():
@@ -151,7 +151,7 @@ def _nodes(mesh: HexMesh, table: TomlTable) -> Ints32:
 def _step(number: int, table: TomlTable) -> Step:
     name = table.text("name") or f"step {number + 1}"
     try:
-        check_name(name, "the step's name")  # pictures are called by it
+        check_name(name, "the step's name")  # it is part of the pictures' file names
     except InputError as error:
         table.fail("name", error.message)
     step = Step(
@@ -189,7 +189,7 @@ def _support(table: TomlTable) -> Support:
 
 
 def _along_axes(table: TomlTable) -> dict[int, float]:
-    """Numbers by the axes they are given for; refuses other keys than were asked for."""
+    """Numbers by axis index; unknown keys of the table are rejected."""
     found = {axis: table.number(name) for axis, name in enumerate(_AXES)}
     table.finish()
     return {axis: value for axis, value in found.items() if value is not None}

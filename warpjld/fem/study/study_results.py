@@ -1,4 +1,4 @@
-"""A study's results in a folder: a series for ParaView, a table of reactions, pictures; all of it at every instant."""
+"""Results of a study in a folder: a ParaView series, a table of reactions and pictures, complete at every instant."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ __all__ = ["Reaction", "StudyResults"]
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """Sum of the reactions of a set at an instant.
+    """Sum of the reactions at a set at an instant.
 
     Attributes:
         step: The step's name.
         load: Load factor.
-        where: Set that is held.
-        force: [N], shape (3,).
+        where: Name of the set.
+        force: The sum [N], shape (3,).
     """
 
     step: str
@@ -35,13 +35,13 @@ class Reaction:
 
 
 class StudyResults:
-    """Written as equilibria are reached, so that a study that stops leaves what it had.
+    """Writer of results as equilibria are found, so that an interrupted study leaves complete files.
 
     Args:
-        study: What is solved.
-        folder: Where to; must be there.
-        name: Of the series, without suffix.
-        pictures: Draw displacement and stress after each step.
+        study: The study.
+        folder: Output folder, which must exist.
+        name: File name of the series, without suffix.
+        pictures: Whether to draw displacement and stress after each step.
     """
 
     def __init__(self, study: FemStudy, folder: Path, name: str, *, pictures: bool = True) -> None:
@@ -54,7 +54,7 @@ class StudyResults:
         self._pictures = pictures
 
     def add(self, reached: StudyInstant) -> None:
-        """Keep an equilibrium; the first of a new step has the step before drawn."""
+        """Write an equilibrium; with the first of a new step, draw the previous step."""
         if self.last is not None and self.last.step is not reached.step:
             self._draw(self.last)
         if self.last is None:
@@ -73,7 +73,7 @@ class StudyResults:
             self._draw(self.last)
 
     def content(self) -> dict[str, Any]:
-        """Everything as plain values."""
+        """All results as plain values, for JSON."""
         mesh = self.study.body.mesh
         return {
             "title": self.study.title,

@@ -1,7 +1,7 @@
-"""Vertex caches: a deformed surface, frame after frame, in the files that animation and science tools read.
+"""Vertex caches: files with a deformed surface per frame, for animation and scientific tools.
 
-The surface is computed welded and exported in the vertex order of its source: faces, texture coordinates and
-materials made for the source's mesh fit the cache.
+The surface is computed on welded vertices and exported in the vertex order of its source, so that faces, texture
+coordinates and materials made for the source's mesh fit the cache.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from warpjld.io.caches.cache import Cache, CacheTiming
 
 __all__ = ["FORMATS", "Cache", "check_cache", "open_cache"]
 
-#: What each suffix is, for help texts.
+#: Suffix → description, for help texts.
 FORMATS = {
     ".usd": "USD, binary: a mesh with time-sampled points",
     ".usda": "USD as text",
@@ -50,18 +50,18 @@ def open_cache(
     start_frame: int = 0,
     name: str = "surface",
 ) -> Cache:
-    """Open a cache for writing; the suffix chooses the format (see `FORMATS`).
+    """Open a cache for writing; the suffix determines the format (see `FORMATS`).
 
-    Use it in a ``with`` statement. Nothing is left on disk when the statement ends with an exception, or when
-    another number of frames was written than announced. Memory does not grow with the number of frames, except
-    for ``.glb``, which is limited to short clips.
+    Use it in a ``with`` statement. No file is left if the statement ends with an exception, or if the number of frames
+    written differs from the one announced. Memory does not grow with the number of frames, except for ``.glb``, which
+    is limited to short clips.
 
     Args:
-        path: File to write; its folder is made if missing. For ``.obj`` the name of the sequence: ``hand.obj``
+        path: File to write; its folder is created if necessary. For ``.obj`` the name of the sequence: ``hand.obj``
             becomes ``hand.0000.obj``, ``hand.0001.obj``, … Beside ``hand.pc2`` and ``hand.mdd``, which hold
             positions only, ``hand.rest.obj`` is written: the rest mesh in the same vertex order.
-        surface: The surface that moves.
-        frames: How many frames will be written.
+        surface: The surface.
+        frames: Number of frames that will be written.
         rate: Frames per second.
         start_frame: Number of the first frame.
         name: Name of the mesh inside the file.
@@ -89,7 +89,7 @@ def open_cache(
 
 
 def check_cache(path: str | Path) -> None:
-    """Make sure that a cache of this kind can be written, before anything else is computed.
+    """Check that a cache of this format can be written, before long computations.
 
     Raises:
         InputError: Unknown suffix.

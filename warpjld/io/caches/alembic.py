@@ -1,7 +1,7 @@
-"""Alembic: a polygon mesh under a transform, one sample of positions a frame.
+"""Writer of Alembic: a polygon mesh under a transform, a sample of positions per frame.
 
-Alembic knows neither units nor an up axis; programs take Y up. Its faces are clockwise seen from outside, so their
-corners, and the texture coordinates with them, are in the reverse order. Frame n stands at n / rate seconds.
+Alembic stores neither units nor an up axis; programs assume Y up. Its faces are clockwise seen from outside, so face
+corners and their texture coordinates are reversed. Frame n is at n / rate seconds.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from warpjld.io.caches.cache import Cache
 
 __all__ = ["AlembicCache"]
 
-_ROOM = 16 << 20  # bytes that stay free: others write, too, and the archive's directory comes last
+_ROOM = 16 << 20  # bytes of disk space to leave free: other programs write, too, and the archive's index comes last
 
 
 def _alembic() -> tuple[Any, Any, Any]:
-    """Its modules ``Abc`` and ``AbcGeom`` and its class ``TimeSampling``."""
+    """The modules ``Abc`` and ``AbcGeom``, and the class ``TimeSampling``."""
     try:
         from alembic3d import Abc, AbcGeom
         from alembic3d.AbcCoreAbstract import TimeSampling
@@ -35,7 +35,7 @@ def _alembic() -> tuple[Any, Any, Any]:
 
 
 class AlembicCache(Cache):
-    """Alembic in its Ogawa form, which is written sample by sample."""
+    """Alembic in its Ogawa format, written sample by sample."""
 
     note = "Y up, metres, points in the source's vertex order, faces wound clockwise as Alembic has them"
 
@@ -44,10 +44,10 @@ class AlembicCache(Cache):
 
     @classmethod
     def check(cls) -> None:
-        """Make sure that Alembic is installed.
+        """Check that Alembic is installed.
 
         Raises:
-            MissingExtraError: It is not.
+            MissingExtraError: It is not installed.
         """
         _alembic()
 
@@ -67,7 +67,7 @@ class AlembicCache(Cache):
 
         self._check_room(vertices.nbytes)
         sample = AbcGeom.OPolyMeshSchemaSample()
-        kept = [_array(imath.V3fArray, vertices)]  # samples refer to arrays, they do not hold them
+        kept = [_array(imath.V3fArray, vertices)]  # samples keep no references to their arrays
         sample.setPositions(kept[0])
         if self.written == 0:
             faces = self.surface.source_faces[:, ::-1]
@@ -84,7 +84,7 @@ class AlembicCache(Cache):
             self._mesh.getSchema().set(sample)
 
     def _check_room(self, size: int) -> None:
-        """Make sure that a frame finds room: Alembic's library ends the whole process where the disk is full."""
+        """Check the free disk space: Alembic's library terminates the process when the disk is full."""
         if shutil.disk_usage(self.path.parent).free < _ROOM + 4 * size:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -93,7 +93,7 @@ class AlembicCache(Cache):
         self._close()
 
     def _close(self) -> None:
-        # the file is complete when nothing refers to the archive any more
+        # the file is completed when the archive object is deleted
         self._mesh = None
         self._archive = None
 

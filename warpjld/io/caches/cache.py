@@ -1,4 +1,4 @@
-"""What all cache writers share: checking the frames, source vertex order, and all or nothing on disk."""
+"""Base class of cache writers: validation of frames, source vertex order, and atomic creation of files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Cache", "CacheTiming"]
 
 @dataclass(frozen=True)
 class CacheTiming:
-    """Timing and name of what is cached: ``frames`` frames from ``start`` on at ``rate`` frames per second."""
+    """Timing and name of a clip: ``frames`` frames from number ``start`` at ``rate`` frames per second."""
 
     frames: int
     rate: float
@@ -39,17 +39,17 @@ class CacheTiming:
 
 
 class Cache(ABC):
-    """A vertex cache being written; made by `open_cache`, used in a ``with`` statement.
+    """A vertex cache being written; created by `open_cache`, used in a ``with`` statement.
 
-    Files are written under a temporary name beside their place and renamed when all announced frames are there.
+    Files are written under a temporary name in the same folder and renamed when all announced frames are written.
 
     Attributes:
-        path: The file asked for.
-        surface: The surface that moves.
+        path: The requested file.
+        surface: The surface.
         clip: Its timing.
-        written: Frames written so far.
-        files: The files made: empty until the ``with`` statement has ended well.
-        note: What whoever opens the files should know; may be empty.
+        written: Number of frames written so far.
+        files: The files created; empty until the ``with`` statement has ended without error.
+        note: Information for users of the files; may be empty.
     """
 
     note: str = ""
@@ -66,10 +66,10 @@ class Cache(ABC):
 
     @classmethod
     def check(cls) -> None:
-        """Make sure that what the format needs is installed; most need nothing.
+        """Check that the libraries the format needs are installed; most formats need none.
 
         Raises:
-            MissingExtraError: It is not.
+            MissingExtraError: One is not installed.
         """
         return
 
@@ -85,8 +85,8 @@ class Cache(ABC):
             vertices: Welded positions [m], shape (n, V, 3).
 
         Raises:
-            InputError: Wrong shape, not finite, more frames than announced, or the disk refuses.
-            WarpjldError: Outside of the cache's ``with`` statement.
+            InputError: Wrong shape, not finite, more frames than announced, or writing fails.
+            WarpjldError: Called outside of the cache's ``with`` statement.
         """
         if not self._open:
             raise WarpjldError("a cache is written inside its with statement: with open_cache(...) as cache: ...")
@@ -103,7 +103,7 @@ class Cache(ABC):
             number = self.clip.start + self.written + int(frame)
             raise InputError(f"vertices: vertex {vertex} of frame {number} is not finite", path=self.path)
         with self._disk():
-            # one frame at a time: the source's order is a copy, and blocks may be long
+            # frame by frame, since reordering copies
             for frame_vertices in block:
                 self._append(np.ascontiguousarray(self.surface.to_source(frame_vertices), dtype="<f4"))
                 self.written += 1
@@ -137,14 +137,14 @@ class Cache(ABC):
             self._discard()
 
     def _part(self, place: Path) -> Path:
-        """Temporary place of a file that becomes ``place`` on success: of this process alone, with the same suffix."""
+        """Temporary path of a file that becomes ``place`` on success, unique to this process, with the same suffix."""
         if place not in self._parts:
             sweep(place.parent)
             self._parts[place] = part_of(place)
         return self._parts[place]
 
     def _discard(self) -> None:
-        with contextlib.suppress(OSError, RuntimeError, ValueError):  # closing writes, and the disk may be full
+        with contextlib.suppress(OSError, RuntimeError, ValueError):  # closing may write to a full disk
             self._close()
         _remove(self._parts)
         self._parts.clear()
@@ -158,7 +158,7 @@ class Cache(ABC):
 
     @abstractmethod
     def _begin(self) -> None:
-        """Create the files and write what does not depend on the frames."""
+        """Create the files and write everything that precedes the frames."""
 
     @abstractmethod
     def _append(self, vertices: NDArray[np.float32]) -> None:
@@ -166,14 +166,14 @@ class Cache(ABC):
 
     @abstractmethod
     def _finish(self) -> None:
-        """Write what follows the last frame and close the files."""
+        """Write everything that follows the last frame and close the files."""
 
     def _published(self) -> None:  # noqa: B027 - most formats have nothing to do
-        """The files are at their places."""
+        """Called when the files have their final names."""
 
     @abstractmethod
     def _close(self) -> None:
-        """Let go of open files, after success or failure; may be called again."""
+        """Close open files, after success or failure; may be called repeatedly."""
 
 
 def _remove(parts: dict[Path, Path]) -> None:

@@ -1,4 +1,4 @@
-"""glTF binary: the rest mesh, a morph target a frame, and an animation of their weights."""
+"""Writer of glTF binary caches: the rest mesh, a morph target per frame, and an animation of their weights."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from warpjld.io.caches.cache import Cache, CacheTiming
 
 __all__ = ["MAX_BYTES", "MAX_FRAMES", "GlbCache"]
 
-#: Longest clip: the weights animation holds frames² numbers, and viewers hold every target in memory.
+#: Largest number of frames: the weight animation holds frames² numbers, and viewers hold all targets in memory.
 MAX_FRAMES = 300
-#: Largest file.
+#: Largest size of a file.
 MAX_BYTES = 512 << 20
 
 _BYTES_A_VERTEX = 24  # position and normal, float32
 
 
 class GlbCache(Cache):
-    """At key time ``frame / rate`` target ``frame`` has weight 1 and all others 0; linear in between.
+    """glTF binary: at time ``frame / rate`` target ``frame`` has weight 1 and all others 0; linear in between.
 
-    Time starts at 0 whatever the first frame's number, as glTF asks; targets are named by frame number.
+    Time starts at 0, whatever the first frame's number, as glTF requires; targets are named by frame number.
     """
 
     note = "rest mesh with a morph target a frame; time starts at 0"
@@ -58,7 +58,7 @@ class GlbCache(Cache):
             NORMAL=self._blob.add(self._rest_normals, gltf.VEC3, target=gltf.ARRAY_BUFFER),
         )
         if self._uv is not None:
-            # glTF counts v downwards from the top of the picture
+            # v runs downwards from the top of the image in glTF
             flipped = np.asarray(self._uv, np.float32) * [1, -1] + [0, 1]
             attributes.TEXCOORD_0 = self._blob.add(flipped.astype("<f4"), gltf.VEC2, target=gltf.ARRAY_BUFFER)
         indices = self._blob.add(faces, gltf.SCALAR, target=gltf.ELEMENT_ARRAY_BUFFER)
@@ -111,7 +111,7 @@ class GlbCache(Cache):
         self._blob = _Blob()
 
     def _normals(self, source: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Normals of positions in source order, by vertex of the file: smooth across texture seams."""
+        """Normals at positions in source order, per vertex of the file: smooth across texture seams."""
         welded = np.empty((len(self.surface.vertices), 3), np.float32)
         welded[self.surface.weld] = source
         smooth = self.surface.to_source(vertex_normals(welded, self.surface.faces))
@@ -119,7 +119,7 @@ class GlbCache(Cache):
 
 
 def _material() -> gltf.Material:
-    # without one, glTF's default is bare metal
+    # the default material of glTF is metallic
     return gltf.Material(
         name="skin",
         pbrMetallicRoughness=gltf.PbrMetallicRoughness(
@@ -129,7 +129,7 @@ def _material() -> gltf.Material:
 
 
 class _Blob:
-    """The binary chunk and the accessors into it. Every array here is of 4-byte numbers, so all stay aligned."""
+    """The binary chunk and its accessors. All arrays have 4-byte components, which keeps them aligned."""
 
     def __init__(self) -> None:
         self.chunks: list[bytes] = []
@@ -138,7 +138,7 @@ class _Blob:
         self.accessors: list[gltf.Accessor] = []
 
     def add(self, array: NDArray[np.generic], kind: str, *, target: int | None = None, bounds: bool = False) -> int:
-        """Append an array; returns its accessor's number."""
+        """Append an array; returns its accessor's index."""
         content = array.tobytes()
         self.views.append(gltf.BufferView(buffer=0, byteOffset=self.length, byteLength=len(content), target=target))
         rows = array.reshape(len(array), -1)

@@ -1,4 +1,4 @@
-"""MDD, LightWave's point cache, read by Blender's Mesh Cache modifier and by Maya's importers.
+"""Writer of MDD, LightWave's point cache, read by Blender's Mesh Cache modifier and by Maya's importers.
 
 Big-endian: ``int32 frames``, ``int32 points``, ``float32 time [s]`` of every frame, then float32 x, y, z of every
 point of every frame.

@@ -1,4 +1,4 @@
-"""NumPy archive, read with ``numpy.load``: the frames are streamed into the archive, never held."""
+"""Writer of NumPy archives (``numpy.load``): frames are streamed into the archive, never held in memory."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ __all__ = ["NpzCache"]
 
 
 class NpzCache(Cache):
-    """Arrays of the archive, all in the source's vertex order (W vertices, S triangles):
+    """NumPy archive with arrays in the source's vertex order (W vertices, S triangles):
 
     - ``vertices`` float32 (frames, W, 3) [m]; ``rest`` float32 (W, 3) [m]
     - ``faces`` int32 (S, 3)
-    - ``uv`` float32 (W, 2): texture coordinates, only where the source has some; ``corner_uv`` float32 (S, 3, 2)
-      instead, of the faces' corners, where a vertex has several of them
+    - ``uv`` float32 (W, 2): texture coordinates, if the source has any; ``corner_uv`` float32 (S, 3, 2) instead,
+      per face corner, if a vertex has several
     - ``frames`` int64 (frames,): frame numbers; ``rate`` float64 (): frames per second
-    - ``weld`` int32 (W,): vertices with the same number are one point of the surface, split by a texture seam
+    - ``weld`` int32 (W,): vertices with the same value are one point of the surface, split at a texture seam
     """
 
     note = "vertices, faces, uv and rest are in the source's vertex order"
@@ -65,7 +65,7 @@ class NpzCache(Cache):
                 member.close()
             if archive is not None:
                 archive.close()
-        except OSError:  # the disk is full: it would be closed again, and complain again, when it is forgotten
+        except OSError:  # full disk: prevent another attempt to close, and another error, when it is deleted
             if archive is not None:
                 file, archive.fp = archive.fp, None
                 if file is not None:

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: one file a frame, and the rest mesh that accompanies pure point caches."""
+"""Writer of Wavefront OBJ: a file per frame, and the rest mesh that accompanies point caches."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ __all__ = ["ObjCache", "ObjText"]
 
 
 class ObjText:
-    """A surface as OBJ text in source order; all but the positions is formatted once."""
+    """A surface as OBJ text in source order; everything but the positions is formatted once."""
 
     def __init__(self, surface: Surface, name: str) -> None:
         count = len(surface.weld)
-        # nine digits give a float32 back unchanged
+        # nine digits represent a float32 exactly
         self._positions = "v %.9g %.9g %.9g\n" * count
         corners = surface.source_faces + 1
         uv, index = surface.uv, corners
@@ -37,12 +37,12 @@ class ObjText:
         self._tail = f"{texture}s 1\n{faces}"
 
     def format(self, vertices: NDArray[np.float32]) -> bytes:
-        """The whole file for positions (W, 3)."""
+        """The file content for positions (W, 3)."""
         return (self._head + self._positions % tuple(vertices.ravel().tolist()) + self._tail).encode()
 
 
 class ObjCache(Cache):
-    """``hand.obj`` stands for ``hand.0000.obj``, ``hand.0001.obj``, …, numbered from the clip's first frame."""
+    """OBJ sequence: ``hand.0000.obj``, ``hand.0001.obj``, … for ``hand.obj``, numbered from the clip's first frame."""
 
     note = "one file a frame, in the source's vertex order"
 
@@ -56,7 +56,7 @@ class ObjCache(Cache):
         self._close()
 
     def _close(self) -> None:
-        pass  # every frame closed its own file
+        pass  # each frame's file is closed at once
 
     def _published(self) -> None:
         remove_former(self._parts)

@@ -1,4 +1,4 @@
-"""PC2, the point cache of 3ds Max, read by Blender's Mesh Cache modifier and by Maya's importers.
+"""Writer of PC2, the point cache of 3ds Max, read by Blender's Mesh Cache modifier and by Maya's importers.
 
 Little-endian: ``char[12] "POINTCACHE2\\0"``, ``int32 version = 1``, ``int32 points``, ``float32 start frame``,
 ``float32 frames per sample``, ``int32 samples``, then float32 x, y, z of every point of every sample.
@@ -14,7 +14,7 @@ __all__ = ["Pc2Cache"]
 
 
 class Pc2Cache(PointCache):
-    """Point cache 2, one sample a frame. It has no field for the frame rate."""
+    """Point cache 2, one sample per frame. The format does not store the frame rate."""
 
     def _header(self) -> bytes:
         points = len(self.surface.weld)

@@ -1,4 +1,4 @@
-"""Point caches proper: a header, then every frame's positions; the mesh they move lies beside them as OBJ."""
+"""Base class of point caches: a header, then every frame's positions; the mesh is written beside them as OBJ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["PointCache"]
 
 
 class PointCache(Cache):
-    """A file that holds positions only. ``hand.rest.obj`` beside it is the mesh to apply it to."""
+    """A cache file with positions only; ``hand.rest.obj`` beside it is the mesh to apply it to."""
 
     note = "holds positions only: apply it to the mesh in the .rest.obj file beside it, whose vertex order it has"
 
@@ -23,7 +23,7 @@ class PointCache(Cache):
 
     @abstractmethod
     def _header(self) -> bytes:
-        """What precedes the first frame."""
+        """Bytes that precede the first frame."""
 
     def _begin(self) -> None:
         self._file = self._part(self.path).open("wb")

@@ -1,4 +1,4 @@
-"""USD: one mesh whose points and extent are time samples; a time code is a frame number."""
+"""Writer of USD caches: a mesh with time-sampled points and extent; a time code is a frame number."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from warpjld.io.caches.cache import Cache
 
 __all__ = ["UsdCache", "extent_of", "write_texture_coordinates"]
 
-_FLUSH_BYTES = 32 << 20  # of time samples before they are written out and freed
+_FLUSH_BYTES = 32 << 20  # bytes of time samples in memory after which the layer is saved
 
 
 class UsdCache(Cache):
-    """Binary USD. The layer is saved every 32 MB, after which it holds no samples in memory, only their places."""
+    """Binary USD. The layer is saved every 32 MB, which frees the samples' memory."""
 
     note = "Y up, metres, subdivisionScheme none, no normals; faces and points in the source's vertex order"
 
@@ -26,10 +26,10 @@ class UsdCache(Cache):
 
     @classmethod
     def check(cls) -> None:
-        """Make sure that OpenUSD is installed.
+        """Check that OpenUSD is installed.
 
         Raises:
-            MissingExtraError: It is not.
+            MissingExtraError: It is not installed.
         """
         _pxr()
 
@@ -56,7 +56,7 @@ class UsdCache(Cache):
 
         try:
             saved = self._stage.GetRootLayer().Save()
-        except Tf.ErrorException as error:  # a full disk, for one
+        except Tf.ErrorException as error:  # such as for a full disk
             raise OSError("USD could not save the layer: is the disk full?") from error
         if not saved:
             raise OSError("USD could not save the layer")
@@ -97,7 +97,7 @@ def _build_stage(cache: Cache, file: Path) -> tuple[Any, Any]:
 
 
 def write_texture_coordinates(mesh: Any, surface: Surface) -> None:
-    """Primvar ``st`` of a ``UsdGeom.Mesh``: by vertex, or by corner where the texture has seams."""
+    """Write primvar ``st`` of a ``UsdGeom.Mesh``: per vertex, or per corner if the texture has seams."""
     from pxr import Sdf, UsdGeom, Vt
 
     by_corner = surface.corner_uv is not None
@@ -131,7 +131,7 @@ def _last_line(error: Exception) -> str:
 
 
 def extent_of(vertices: NDArray[np.float32]) -> Any:
-    """Corners of the bounding box of positions (n, 3), as USD wants them."""
+    """Corners of the bounding box of positions (n, 3), as USD's extent."""
     from pxr import Vt
 
     return Vt.Vec3fArray.FromNumpy(np.stack([vertices.min(axis=0), vertices.max(axis=0)]))

@@ -1,4 +1,4 @@
-"""USD as text, written without OpenUSD: samples go to the disk as they come."""
+"""Writer of text USD caches without OpenUSD: samples are streamed to the file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PIECE = 4096
 
 
 class UsdTextCache(Cache):
-    """The same content as `UsdCache`, readable by people; several times larger."""
+    """The same content as `UsdCache` as readable text; several times larger."""
 
     note = "Y up, metres, subdivisionScheme none, no normals; faces and points in the source's vertex order"
 

@@ -1,11 +1,11 @@
-"""Program that copies an FBX file's content into an NPZ file: ``extract.py FILE OUT.npz ANIMATED NAME RATE``.
+"""Program that converts an FBX file's content to an NPZ file: ``extract.py FILE OUT.npz ANIMATED NAME RATE``.
 
-It runs in a process of its own, imports nothing of this package, and ends without clearing up, because ufbx's Python
-binding (0.0.5) counts references wrongly: it keeps each element of a scene in a table and hands out the table's own
-reference, and garbage collection frees what it has freed before. Here every element that is met gets one reference
-more, nothing is ever freed, and what still goes wrong in a broken file ends this process only. Memory is bounded too.
+It runs in a process of its own, imports nothing of this package, and exits without cleaning up, because ufbx's Python
+binding (0.0.5) has a reference counting error: it keeps each element of a scene in a table and returns the table's own
+reference, so that garbage collection frees elements twice. Here each element gets an additional reference, nothing is
+ever freed, and a crash on a broken file ends this process only. Memory is limited, too.
 
-All stays in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be
+Everything is in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be
 used, 4 that ufbx cannot be imported.
 """
 
@@ -27,7 +27,7 @@ TRANSFORM = ("Lcl Translation", "Lcl Rotation", "Lcl Scaling")
 
 
 def taken(element: Any) -> Any:
-    """An element of the scene, kept for good."""
+    """An element of the scene with an additional reference, which is never released."""
     if element is not None:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(element))
         KEPT.append(element)
@@ -63,7 +63,7 @@ def load(path: str) -> Any:
             path,
             file_format=ufbx.FileFormat.FBX,
             ignore_embedded=True,
-            # an index beyond its array is told by what it is used for, not moved to another vertex in silence
+            # invalid indices are reported by their user, not moved to another vertex silently
             index_error_handling=ufbx.IndexErrorHandling.NO_INDEX,
         )
     except (ufbx.UfbxError, RuntimeError, ValueError) as error:
@@ -93,7 +93,7 @@ def kind(node: Any) -> str:
 
 
 def blend_offsets(mesh: Any, count: int) -> Array:
-    """Sum of the blend shapes as the file has them set."""
+    """Sum of the blend shapes at their weights in the file."""
     out = np.zeros((count, 3))
     for deformer in elements(mesh.blend_deformers):
         for channel in elements(deformer.channels):
@@ -113,7 +113,7 @@ def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) 
     points = array(mesh.vertices, np.float64)
     faces = mesh.faces
     spans = np.array([tuple(faces[i]) for i in range(len(faces))], dtype=np.int64).reshape(-1, 2)
-    # nothing says that a polygon starts where the last one ended
+    # polygons need not be contiguous
     corner = np.concatenate([np.zeros(0, np.int64), *(np.arange(a, a + n) for a, n in spans)])
     out = {
         "points": points + blend_offsets(mesh, len(points)),
@@ -149,7 +149,7 @@ def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) 
 
 
 def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
-    """Name, span and moved nodes of every animation stack; the span is the keys' own where the stack has none."""
+    """Name, time span and moved nodes of every animation stack; the span is that of the keys if it states none."""
     out: list[dict[str, Any]] = []
     for stack in elements(scene.anim_stacks):
         moved, curved, times, shapes = set(), set(), [], False
@@ -182,13 +182,13 @@ def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
 
 
 def varies(curve: Any) -> bool:
-    """Whether a curve's keys, as far as there is one, have several values."""
+    """Whether a curve (or None) has keys of different values."""
     keys: Any = () if curve is None else curve.keyframes
     return len({keys[i].value for i in range(len(keys))}) > 1
 
 
 def sample(scene: Any, stack: int, times: Array) -> Array:
-    """Node-to-world transforms by frame, shape (F, N, 4, 4): all that moves nodes is ufbx's to compose."""
+    """Node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4)."""
     anim = taken(taken(scene.anim_stacks[stack]).anim)
     worlds = np.tile(np.eye(4), (len(times), len(scene.nodes), 1, 1))
     for world, time in zip(worlds, times, strict=True):
@@ -197,12 +197,12 @@ def sample(scene: Any, stack: int, times: Array) -> Array:
         nodes = shown.nodes
         for n in range(len(nodes)):
             world[n, :3] = np.array(taken(nodes[n]).node_to_world).T
-        shown.free()  # its memory; what stands for its nodes here stays
+        shown.free()  # frees its memory; the Python objects of its nodes remain
     return worlds
 
 
 def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
-    gc.disable()  # it frees what is in use
+    gc.disable()  # it would free elements in use
     bound_memory(os.path.getsize(path))
     scene = load(path)
     KEPT.append(scene)
@@ -243,7 +243,7 @@ def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
         count = (stack["end"] - stack["begin"]) * rate_
         if not 0.0 <= count < 1e6:
             fail(f"animation '{stack['name']}' would have {count:.3g} frames: at most 1000000")
-        # as warpjld.motion.frame_times: neither a rate rounded to 23.976 nor single floats lose the last frame
+        # as warpjld.motion.frame_times: rounding (23.976, float32) must not lose the last frame
         slack = min(0.01 + 2e-5 * count, 0.4)
         times = np.minimum(stack["begin"] + np.arange(int(np.floor(count + slack)) + 1) / rate_, stack["end"])
         arrays["worlds"] = sample(scene, chosen, times)
@@ -252,16 +252,16 @@ def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
 
 
 def stated_rate(rate: float) -> float:
-    """Frames a second that a file states: 23.976, as a single float, is 24000/1001, and so are its kin."""
+    """Exact frame rate of a rounded one: 23.976 as float32 is 24000/1001, and likewise for other NTSC rates."""
     broadcast = round(rate * 1.001) / 1.001
     nearest = min((float(round(rate)), broadcast), key=lambda nice: abs(nice - rate))
     return nearest if abs(nearest - rate) <= 2e-5 * rate else rate
 
 
 def choose(several: list[dict[str, Any]], name: str) -> int | None:
-    """Number of the stack of this name, or of the first that moves something; None where there is none.
+    """Index of the stack of this name, or of the first that moves something; None if there is none.
 
-    Case does not matter where that leaves one, nor does the object's name that Blender puts before an action's.
+    Differences in case, and the object's name that Blender puts before an action's, are ignored if this is unambiguous.
     """
     if name:
         for plain in (str, str.lower, lambda full: full.rpartition("|")[2].lower()):
@@ -279,7 +279,7 @@ def choose(several: list[dict[str, Any]], name: str) -> int | None:
 def bound_memory(size: int) -> None:
     try:
         import resource
-    except ImportError:  # Windows has no such limit
+    except ImportError:  # not available on Windows
         return
     limit = 4 * 2**30 + 200 * size
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
@@ -293,4 +293,4 @@ if __name__ == "__main__":
     except MemoryError:
         fail("needs more memory than a file of its size should")
     sys.stdout.flush()
-    os._exit(0)  # without clearing up: see above
+    os._exit(0)  # without cleaning up, see the module's docstring

@@ -1,4 +1,4 @@
-"""FBX skins → :class:`SourceRig`."""
+"""Reader of skinned meshes of FBX files as :class:`SourceRig`."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from warpjld.io.source import SourceRig
 
 __all__ = ["read_fbx_rig"]
 
-_BIND_TOLERANCE = 1e-4  # of the surface's size: where two placements of a mesh count as one
+_BIND_TOLERANCE = 1e-4  # largest difference of two placements of a mesh that count as one, per size of the surface
 
 
 def read_fbx_rig(path: str | Path) -> SourceRig:
-    """Read the meshes of an FBX file that are bound to joints, or hang on one, in metres and Y up.
+    """Read the meshes of an FBX file that are skinned or parented to a joint, in metres and Y up.
 
-    The rest pose is the one in which they were bound. Vertices are the file's control points, in its order. Meshes
-    without a skin that hang on a joint follow it rigidly; others are left out, with a note.
+    The rest pose is the bind pose. Vertices are the file's control points, in its order. Meshes without a skin below a
+    joint follow it rigidly; others are left out, with a note.
 
     Raises:
-        InputError: Not FBX, no skin, or broken data.
+        InputError: Not FBX, no skin, or invalid data.
         MissingExtraError: Without ufbx.
     """
     scene = read_scene(path)
@@ -101,7 +101,7 @@ def _place(scene: FbxScene, skeleton: FbxSkeleton, mesh: FbxMesh, notes: list[st
 
 
 def _lower_detail(scene: FbxScene, node: int) -> bool:
-    """Whether a node lies below any but the first child of a level-of-detail group."""
+    """Whether a node is below a child, other than the first, of a level-of-detail group."""
     while (parent := int(scene.parents[node])) >= 0:
         if scene.kinds[parent] == "lod" and node != int(np.flatnonzero(scene.parents == parent)[0]):
             return True
@@ -112,7 +112,7 @@ def _lower_detail(scene: FbxScene, node: int) -> bool:
 def _influences(
     mesh: FbxMesh, skin: FbxSkin, path: Path, notes: list[str]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
-    """Clusters and weights of every vertex, shapes (W, K), rows summing to one; None where no vertex has any."""
+    """Clusters and weights of every vertex, shapes (W, K), rows summing to one; None if no vertex has any."""
     count = len(mesh.points)
     if not np.isfinite(skin.weight).all() or (skin.weight < 0.0).any():
         bad = int(skin.vertex[np.argwhere(~(np.isfinite(skin.weight) & (skin.weight >= 0.0)))[0][0]])

@@ -1,4 +1,4 @@
-"""What an FBX file says, in metres, right-handed and Y up."""
+"""Content of an FBX file in metres, right-handed and Y up."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from warpjld.errors import InputError, MissingExtraError
 
 __all__ = ["FbxMesh", "FbxScene", "FbxSkin", "FbxStack", "read_scene"]
 
-_FURTHEST = 1e12  # of a file's own units: farther is damage
+_FURTHEST = 1e12  # largest plausible coordinate in the file's units
 _LONGEST = 600.0
-"""Seconds that reading may take."""
+"""Time limit of reading [s]."""
 _NO_LIBRARY = 4
-"""Exit code of the program that reads where ufbx cannot be imported."""
+"""Exit code of the reading program if ufbx cannot be imported."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +31,11 @@ class FbxSkin:
 
     Attributes:
         nodes: Node of every cluster, shape (C,).
-        binds: Its node-to-world transform when it was bound [m], shape (C, 4, 4).
-        inverses: Geometry-to-node transforms then, shape (C, 4, 4).
+        binds: Its node-to-world transform at bind time [m], shape (C, 4, 4).
+        inverses: Geometry-to-node transforms at bind time, shape (C, 4, 4).
         cluster: Cluster of every influence, shape (P,).
-        vertex: Its vertex, shape (P,).
-        weight: Its weight, shape (P,).
+        vertex: Vertex of every influence, shape (P,).
+        weight: Weight of every influence, shape (P,).
     """
 
     nodes: NDArray[np.int64]
@@ -48,17 +48,17 @@ class FbxSkin:
 
 @dataclass(frozen=True, eq=False)
 class FbxMesh:
-    """A mesh at a node, in its own geometry's space.
+    """A mesh at a node, in its local coordinates.
 
     Attributes:
         name: Name of its node.
-        node: Number of its node.
-        points: Vertices with the blend shapes that are set, shape (W, 3).
-        counts: Corners of every polygon.
+        node: Index of its node.
+        points: Vertices, with blend shapes at their weights in the file, shape (W, 3).
+        counts: Number of corners of every polygon.
         corners: Vertex of every corner.
-        uv: Texture coordinates of every corner, origin at the picture's lower left, or None.
-        shown: Geometry-to-world transform that the file shows [m], shape (4, 4).
-        skin: How it is painted, or None.
+        uv: Texture coordinates of every corner, origin at the image's lower left, or None.
+        shown: Geometry-to-world transform of the displayed pose [m], shape (4, 4).
+        skin: Its skin, or None.
     """
 
     name: str
@@ -73,7 +73,7 @@ class FbxMesh:
 
 @dataclass(frozen=True)
 class FbxStack:
-    """An animation: its name, its length [s], how many nodes it moves, and whether it moves blend shapes."""
+    """An animation: name, length [s], number of moved nodes, and whether it moves blend shapes."""
 
     name: str
     length: float
@@ -83,20 +83,20 @@ class FbxStack:
 
 @dataclass(frozen=True, eq=False)
 class FbxScene:
-    """A file's content, N nodes.
+    """Content of a file with N nodes.
 
     Attributes:
         path: The file.
         names: Nodes' names.
         parents: Their parents, which come first, -1 for the scene's root, shape (N,).
         kinds: ``bone``, ``null``, ``mesh``, ``lod`` or ``other``.
-        shown: Node-to-world transforms that the file shows [m], shape (N, 4, 4).
-        pose: The same in the file's bind pose, not a number for nodes that it leaves out.
+        shown: Node-to-world transforms of the displayed pose [m], shape (N, 4, 4).
+        pose: Node-to-world transforms of the file's bind pose, NaN for nodes that are not in it.
         meshes: Meshes in the order of their nodes.
         stacks: Animations.
-        worlds: Node-to-world transforms of the animation asked for, shape (F, N, 4, 4); None without.
+        worlds: Node-to-world transforms of the requested animation, shape (F, N, 4, 4); None without.
         rate: Frames a second.
-        title: That animation's name.
+        title: Name of that animation.
         notes: What was left out.
     """
 
@@ -119,12 +119,12 @@ def read_scene(path: str | Path, *, animated: bool = False, name: str | None = N
 
     Args:
         path: The file.
-        animated: Whether an animation is wanted.
-        name: Which; None for the first that moves anything.
+        animated: Whether to read an animation.
+        name: Name of the animation; None for the first that moves anything.
         rate: Frames a second; 0 for the file's own.
 
     Raises:
-        InputError: It cannot be read, or holds a transform or a vertex that is not finite.
+        InputError: The file cannot be read, or contains a transform or vertex that is not finite.
         MissingExtraError: Without ufbx.
     """
     path = Path(path)
@@ -160,7 +160,7 @@ def read_scene(path: str | Path, *, animated: bool = False, name: str | None = N
 
 
 def _extract(path: Path, animated: bool, name: str, rate: float) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """What :mod:`extract` finds, run as a program: it may crash on a broken file."""
+    """Output of :mod:`extract`, run as a program, since it may crash on a broken file."""
     program = Path(__file__).with_name("extract.py")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
@@ -189,11 +189,11 @@ def _extract(path: Path, animated: bool, name: str, rate: float) -> tuple[dict[s
 
 
 def _world_axes(axes: list[int], unit: float) -> NDArray[np.float64]:
-    """Transform from the file's units and axes to metres, right-handed, Y up; mirrors where they are left-handed.
+    """Transform from the file's units and axes to metres, right-handed, Y up; mirrors for left-handed files.
 
     Args:
-        axes: What points right, up and to the viewer: ufbx's numbers, x, -x, y, -y, z, -z.
-        unit: Metres.
+        axes: File axes that point right, up and to the viewer, as ufbx's numbers for x, -x, y, -y, z, -z.
+        unit: The file's unit [m].
     """
     rows = np.zeros((3, 3))
     for row, axis in zip(rows, axes, strict=True):

@@ -1,8 +1,7 @@
-"""The joints of an FBX file and their rest, which is the pose that its meshes were bound in.
+"""The joints of an FBX file and their rest pose, the pose in which its meshes were bound.
 
-Nodes often show another pose than that, a frame of an animation mostly. Clusters say where their joint was when it was
-bound; joints without a cluster are where the bind pose has them relative to one with, or, where there is none, as the
-nodes show it.
+The file often displays another pose, such as a frame of an animation. Clusters give the transforms of their joints at
+bind time; joints without a cluster are placed relative to one that has one, by the bind pose, or else as displayed.
 """
 
 from __future__ import annotations
@@ -20,21 +19,21 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["FbxSkeleton", "find_skeleton"]
 
 _SAME = 1e-4
-"""Transforms that differ by less, relative to the skeleton's size, are the same."""
-_SINGULAR = 1e-12  # determinant over size cubed
-_SCALED = 1e-3  # by which a scale may be off 1 and is none
+"""Largest difference of transforms that count as equal, per size of the skeleton."""
+_SINGULAR = 1e-12  # determinant, per size cubed, up to which a matrix is singular
+_SCALED = 1e-3  # deviation of a scale from 1 that is ignored
 
 
 @dataclass(frozen=True, eq=False)
 class FbxSkeleton:
-    """J joints of a file.
+    """The J joints of a file.
 
     Attributes:
         nodes: Their nodes, shape (J,).
-        tree: The joints at rest, their axes of length one and at right angles.
-        binds: Joint-to-world transforms at rest as the file has them [m], scale and all, shape (J, 4, 4).
-        squared: What makes them so: ``tree.frames = binds @ squared``, shape (J, 4, 4).
-        notes: What was found odd.
+        tree: The joints at rest, with orthonormal axes.
+        binds: Joint-to-world transforms at rest as in the file [m], with scale, shape (J, 4, 4).
+        squared: Orthonormalisation: ``tree.frames = binds @ squared``, shape (J, 4, 4).
+        notes: Irregularities, for the user.
     """
 
     nodes: NDArray[np.int64]
@@ -45,7 +44,7 @@ class FbxSkeleton:
 
 
 def find_skeleton(scene: FbxScene) -> FbxSkeleton:
-    """The joints: nodes that meshes are bound to and the bones about them; in files without a skin, the bones.
+    """The joints: nodes that meshes are bound to and related bones; in files without a skin, all bones.
 
     Raises:
         InputError: There is no joint.
@@ -67,7 +66,7 @@ def find_skeleton(scene: FbxScene) -> FbxSkeleton:
 
 
 def _bound(scene: FbxScene) -> dict[int, NDArray[np.float64]]:
-    """How every node with a cluster was bound: the first mesh counts."""
+    """Bind transform of every node with a cluster; that of the first mesh counts."""
     out: dict[int, NDArray[np.float64]] = {}
     for mesh in scene.meshes:
         for node, bind in zip(mesh.skin.nodes, mesh.skin.binds, strict=True) if mesh.skin is not None else ():
@@ -85,7 +84,7 @@ def _joints(scene: FbxScene, bound: set[int]) -> set[int]:
     elif len(bones) < 2:
         return {n for n, kind in enumerate(scene.kinds) if kind in ("bone", "null", "mesh") and scene.parents[n] >= 0}
     joints -= _leaves(scene, joints, bound)
-    # a plain node from which several chains start belongs to the skeleton if it is called so: hips, say
+    # a plain node at which several chains branch belongs to the skeleton if it is named so, such as "hips"
     carrying = np.zeros(len(scene.names), dtype=np.int64)
     below = np.isin(np.arange(len(scene.names)), list(joints))
     for n in range(len(scene.names) - 1, 0, -1):  # parents come first
@@ -97,13 +96,13 @@ def _joints(scene: FbxScene, bound: set[int]) -> set[int]:
 
 
 def _leaves(scene: FbxScene, joints: set[int], bound: set[int]) -> set[int]:
-    """Bones that Blender's exporter adds at the ends of chains, to say how long the last bone was drawn."""
+    """Bones that Blender's exporter adds at the ends of chains to store the length of the last bone."""
     ends = joints - bound - {int(parent) for parent in scene.parents}
     return {n for n in ends if scene.names[n] == f"{scene.names[scene.parents[n]]}_end"}
 
 
 def _ordered(scene: FbxScene, joints: set[int]) -> list[int]:
-    """Joints with all that hangs on one after it, before its next sibling."""
+    """Joints in depth-first order."""
     children: list[list[int]] = [[] for _ in scene.names]
     for n, parent in enumerate(scene.parents):
         if parent >= 0:
@@ -118,7 +117,7 @@ def _ordered(scene: FbxScene, joints: set[int]) -> list[int]:
 
 
 def _above(scene: FbxScene, node: int, joints: dict[int, int]) -> int:
-    """Nearest joint above a node, -1 for none."""
+    """Nearest ancestor that is a joint, -1 for none."""
     above = int(scene.parents[node])
     while above >= 0 and above not in joints:
         above = int(scene.parents[above])
@@ -126,7 +125,7 @@ def _above(scene: FbxScene, node: int, joints: dict[int, int]) -> int:
 
 
 def _top(scene: FbxScene, node: int, joints: set[int]) -> int:
-    """Topmost joint among a node and what it hangs on."""
+    """Topmost joint among a node and its ancestors."""
     top = node
     while node >= 0:
         top = node if node in joints else top
@@ -137,7 +136,7 @@ def _top(scene: FbxScene, node: int, joints: set[int]) -> int:
 def _as_shown(
     bound: dict[int, NDArray[np.float64]], scene: FbxScene, notes: list[str]
 ) -> dict[int, NDArray[np.float64]]:
-    """Bound transforms, where and as large as the scene shows the skeleton."""
+    """Bind transforms, at the place and scale at which the scene displays the skeleton."""
     if not bound:
         return bound
     nodes = list(bound)
@@ -145,7 +144,7 @@ def _as_shown(
     moved = shown @ np.linalg.inv(binds)
     size = float(np.linalg.norm(np.ptp(shown[:, :3, 3], axis=0))) or 1.0
     if np.abs(moved[0] @ binds - shown)[:, :3, 3].max() <= _SAME * size and _same_turn(moved):
-        return dict(zip(nodes, shown, strict=True))  # bound in the pose that is shown, if not at the same place
+        return dict(zip(nodes, shown, strict=True))  # bound in the displayed pose, up to a common transform
     scales = np.cbrt(np.abs(np.linalg.det(moved[:, :3, :3])))
     scale = float(np.median(scales))
     if not abs(scale - 1.0) > _SCALED or np.ptp(scales) > 0.01 * scale:
@@ -162,13 +161,13 @@ def _same_turn(moved: NDArray[np.float64]) -> bool:
 def _rest(
     scene: FbxScene, nodes: list[int], parents: NDArray[np.int64], known: dict[int, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Joint-to-world transforms at rest, shape (J, 4, 4): the known ones, the others by their relation to those."""
+    """Joint-to-world transforms at rest, shape (J, 4, 4): the known ones, and others relative to these."""
     binds = np.zeros((len(nodes), 4, 4))
     done = np.zeros(len(nodes), dtype=bool)
     for j, node in enumerate(nodes):
         if node in known:
             binds[j], done[j] = known[node], True
-    for j in reversed(range(len(nodes))):  # above the first known one
+    for j in reversed(range(len(nodes))):  # ancestors of known joints
         parent = int(parents[j])
         if done[j] and parent >= 0 and not done[parent]:
             binds[parent], done[parent] = binds[j] @ _relation(scene, nodes[j], nodes[parent]), True
@@ -181,7 +180,7 @@ def _rest(
 
 
 def _relation(scene: FbxScene, start: int, end: int) -> NDArray[np.float64]:
-    """Transform from one node to another in the bind pose, or as shown."""
+    """Relative transform of two nodes in the bind pose, or as displayed."""
     for transforms in (scene.pose, scene.shown):
         a, b = transforms[start], transforms[end]
         if np.isfinite(a).all() and np.isfinite(b).all() and _regular(a):
@@ -191,7 +190,7 @@ def _relation(scene: FbxScene, start: int, end: int) -> NDArray[np.float64]:
 
 
 def _squared(binds: NDArray[np.float64]) -> NDArray[np.float64]:
-    """S with ``binds @ S`` rotations and translations, shape (J, 4, 4)."""
+    """Transforms S such that ``binds @ S`` consist of rotations and translations, shape (J, 4, 4)."""
     out = np.tile(np.eye(4), (len(binds), 1, 1))
     for j, bind in enumerate(binds[:, :3, :3]):
         if not _regular(binds[j]):
@@ -203,6 +202,6 @@ def _squared(binds: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _regular(transform: NDArray[np.float64]) -> bool:
-    """Whether a transform can be inverted."""
+    """Whether a transform is invertible."""
     size = np.abs(transform[:3, :3]).max()
     return bool(abs(np.linalg.det(transform[:3, :3])) > _SINGULAR * size**3)

@@ -1,4 +1,4 @@
-"""glTF accessors: typed views into buffers, with strides, sparse substitutions and normalised integers."""
+"""Reader of glTF accessors: typed views into buffers, with strides, sparse values and normalised integers."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
-    """Elements of accessor ``index`` as a fresh array; matrices as rows and columns.
+    """Elements of accessor ``index`` as a new array; matrices as rows and columns.
 
     Raises:
-        InputError: It does not exist, points beyond the file, or is of an unknown type.
+        InputError: It does not exist, exceeds the file, or is of an unknown type.
     """
     if not 0 <= index < len(gltf.accessors):
         raise InputError(f"accessor {index} does not exist: the file has {len(gltf.accessors)}")
@@ -41,7 +41,7 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
     if not accessor.count >= 0:
         raise InputError(f"{what}: {accessor.count} elements; want 0 or more")
     if accessor.bufferView is None:
-        check_limit("vertices", accessor.count, of=what)  # others are as large as their bytes
+        check_limit("vertices", accessor.count, of=what)  # others are limited by the file's size
         out = np.zeros((accessor.count, *shape), dtype)
     else:
         out = _strided(gltf, buffers, what, accessor.bufferView, accessor.byteOffset or 0, accessor.count, dtype, shape)

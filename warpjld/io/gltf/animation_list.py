@@ -1,4 +1,4 @@
-"""Which animations a glTF file has: exporters that write one for every node mean a single one."""
+"""The animations of a glTF file by name; several with one node each, as some exporters write them, count as one."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ __all__ = ["list_animations"]
 
 
 def list_animations(document: Document) -> dict[str, list[int]]:
-    """Animations by name, in the file's order: the numbers of those that play together.
+    """Animations by name, in the file's order, each as the indices of those that are played together.
 
-    Unnamed ones are ``animation 0`` …; of several with one name the later ones get ``#2`` … .
+    Unnamed ones are called ``animation 0`` …; duplicate names get ``#2`` … appended.
     """
     animations = document.gltf.animations or []
     if _one_per_node(document, animations):
@@ -26,7 +26,7 @@ def list_animations(document: Document) -> dict[str, list[int]]:
 
 
 def _one_per_node(document: Document, animations: list[Any]) -> bool:
-    """Whether each of several animations moves a node of its own, and their names tell nothing but which one."""
+    """Whether each of several animations moves a different node, and their names differ by that node only."""
     if len(animations) < 2:
         return False
     moved = [{c.target.node for c in a.channels if c.target.node is not None} for a in animations]
@@ -39,5 +39,5 @@ def _one_per_node(document: Document, animations: list[Any]) -> bool:
 
 
 def _stem(name: str) -> str:
-    """A name without the number that tells it from its siblings, as in ``Action.003``."""
+    """A name without its trailing number, as in ``Action.003``."""
     return re.sub(r"[\s._#-]*\d+$", "", name)

@@ -1,4 +1,4 @@
-"""A .gltf or .glb file's JSON and binary chunk."""
+"""Reader of a .gltf or .glb file's JSON and binary chunk."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _JSON, _BINARY = 0x4E4F534A, 0x004E4942  # chunk types of GLB: "JSON", "BIN\0"
 
 
 def read_container(path: Path) -> tuple[str, dict[str, Any], bytes | None]:
-    """The JSON of a glTF 2.0 file as text and parsed, and its binary chunk where it has one.
+    """The JSON of a glTF 2.0 file, as text and parsed, and its binary chunk or None.
 
     Raises:
-        InputError: It cannot be read, is truncated, is glTF 1.0, or none at all.
+        InputError: It cannot be read, is truncated, is glTF 1.0, or not glTF.
     """
     data = read_bytes(path)
     if data[:4] == b"glTF":

@@ -1,4 +1,4 @@
-"""A glTF 2.0 file (.gltf or .glb) opened and checked: its buffers, accessors and node tree."""
+"""An opened and validated glTF 2.0 file (.gltf or .glb): buffers, accessors and node tree."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ else:
 
 __all__ = ["Document", "open_document"]
 
-_FURTHEST = 1e12  # of a file's own units: farther is damage
+_FURTHEST = 1e12  # largest plausible coordinate in the file's units
 _KIND = "a glTF 2.0 file"
 _NODE = (
     *("camera", "children", "extensions", "extras", "matrix", "mesh", "name"),
@@ -42,8 +42,8 @@ _UNPACK = "export it without compression"
 
 
 class Document:
-    """An open file: ``gltf`` is pygltflib's tree of plain objects, ``content`` the JSON, of which that leaves out some;
-    arrays and transforms come from the methods."""
+    """An open file: ``gltf`` is pygltflib's tree of objects, ``content`` the complete JSON (pygltflib drops some of
+    it); arrays and transforms are returned by the methods."""
 
     def __init__(self, path: Path, gltf: Any, content: dict[str, Any]) -> None:
         self.path = path
@@ -59,7 +59,7 @@ class Document:
         """An accessor's elements, shape (n,), (n, k) or (n, rows, columns); normalised integers as float64.
 
         Raises:
-            InputError: It does not exist, points beyond the file, or is of an unknown type.
+            InputError: It does not exist, exceeds the file, or is of an unknown type.
         """
         if (extension := packed_view(self.gltf, index)) is not None:
             raise InputError(f"accessor {index} is compressed with {extension}: {_UNPACK}", path=self.path)
@@ -69,12 +69,12 @@ class Document:
             raise InputError(error.message, path=self.path) from None
 
     def reading(self) -> AbstractContextManager[None]:
-        """While the statement lasts the file is read: pygltflib takes any JSON, so that a text where the schema wants
-        a number shows only where it is used."""
+        """Context in which type errors are reported as an invalid file: pygltflib accepts any JSON, so that wrong types
+        (a text instead of a number) appear only when used."""
         return reading(self.path, _KIND)
 
     def name(self, node: int) -> str:
-        """A node's name, or ``node 7`` where the file gives none."""
+        """A node's name, or ``node 7`` if it has none."""
         return self.gltf.nodes[node].name or f"node {node}"
 
     @cached_property
@@ -93,7 +93,7 @@ class Document:
                 if parents[child] >= 0:
                     raise InputError(f"node '{self.name(child)}' has two parents", path=self.path)
                 parents[child] = i
-        # every node is reached from a root, but for those that lead in a circle
+        # nodes that are not reached from a root form a cycle
         reached = np.zeros(count, dtype=bool)
         todo = np.flatnonzero(parents < 0).tolist()
         while todo:
@@ -106,10 +106,10 @@ class Document:
 
     @cached_property
     def worlds(self) -> NDArray[np.float64]:
-        """Node-to-world transforms of the pose the file shows, shape (N, 4, 4).
+        """Node-to-world transforms of the displayed pose, shape (N, 4, 4).
 
         Raises:
-            InputError: A transform that is not finite, or out of all proportion.
+            InputError: A transform that is not finite, or implausibly large.
         """
         worlds = np.zeros((len(self.gltf.nodes), 4, 4))
         done = np.zeros(len(worlds), dtype=bool)
@@ -131,7 +131,7 @@ class Document:
 
     @cached_property
     def shown(self) -> frozenset[int]:
-        """Nodes of the default scene; all where the file has no scene."""
+        """Nodes of the default scene; all nodes if the file has no scene."""
         scenes = self.gltf.scenes
         if not scenes:
             return frozenset(range(len(self.gltf.nodes)))
@@ -151,15 +151,15 @@ class Document:
 
     @cached_property
     def flattened(self) -> tuple[int, ...]:
-        """Nodes whose own scale is zero in some direction; their transforms have a tiny one there, so that they can
-        be inverted."""
+        """Nodes with zero scale in some direction; their transforms have a tiny one instead, so that they are
+        invertible."""
         return tuple(n for n in range(len(self.gltf.nodes)) if not _invertible(self._plain(n)[:3, :3]))
 
     def local(self, node: int) -> NDArray[np.float64]:
         """A node's transform relative to its parent, shape (4, 4); zero scale is replaced by a tiny one.
 
         Raises:
-            InputError: A rotation without length.
+            InputError: A rotation of length zero.
         """
         record = self.gltf.nodes[node]
         out = self._plain(node)
@@ -171,10 +171,10 @@ class Document:
         return out
 
     def parts(self, node: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """A node's translation, rotation (unit quaternion x, y, z, w) and scale; those of a matrix without shear.
+        """A node's translation, rotation (unit quaternion x, y, z, w) and scale; a matrix must be free of shear.
 
         Raises:
-            InputError: A rotation without length.
+            InputError: A rotation of length zero, or a matrix with shear.
         """
         record = self.gltf.nodes[node]
         if record.matrix is not None:
@@ -229,7 +229,7 @@ def open_document(path: str | Path) -> Document:
     """Open a .gltf or .glb file.
 
     Raises:
-        InputError: No such file, not glTF 2.0, truncated, or it needs an extension that is not read.
+        InputError: No such file, not glTF 2.0, truncated, or an unsupported required extension.
     """
     path = Path(path)
     _, content, blob = read_container(path)

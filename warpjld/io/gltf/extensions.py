@@ -1,4 +1,4 @@
-"""glTF extensions: which a file may require, and which would make its arrays mean something else."""
+"""glTF extensions: those that may be required, and those that change the meaning of arrays."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from warpjld.errors import InputError
 __all__ = ["check_extensions", "packed_view"]
 
 _HARMLESS = re.compile(
-    r"KHR_materials_\w+|KHR_texture_\w+|EXT_texture_\w+|MSFT_texture_dds|MSFT_packing_\w+|MSFT_lod"  # looks
+    r"KHR_materials_\w+|KHR_texture_\w+|EXT_texture_\w+|MSFT_texture_dds|MSFT_packing_\w+|MSFT_lod"  # appearance
     r"|KHR_lights_\w+|EXT_lights_\w+|KHR_xmp\w*|KHR_audio\w*|FB_ngon_encoding|CESIUM_\w+"
-    r"|KHR_mesh_quantization|KHR_animation_pointer"  # integers as any accessor has; channels that name no joint
-    r"|VRM|VRMC_\w+"  # avatars: what their bones are called, looks and springs
+    r"|KHR_mesh_quantization|KHR_animation_pointer"  # plain integer accessors; channels of other targets than joints
+    r"|VRM|VRMC_\w+"  # avatars: bone names, appearance and spring bones
 )
-"""Extensions without which joints, skins, surfaces and the motion of joints are read right."""
+"""Extensions that need not be supported to read joints, skins, surfaces and joint animations correctly."""
 
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 _UNPACK = "export it without compression"
 
 
 def check_extensions(gltf: Any) -> None:
-    """Refuse a file that cannot be read right without an extension.
+    """Reject a file that cannot be read correctly without an extension.
 
     Raises:
-        InputError: It requires, or is compressed with, one that is not read.
+        InputError: It requires, or is compressed with, an unsupported extension.
     """
     for name in gltf.extensionsRequired or ():
         if name in _COMPRESSED:
@@ -42,7 +42,7 @@ def check_extensions(gltf: Any) -> None:
 
 
 def packed_view(gltf: Any, accessor: int) -> str | None:
-    """Name of the extension that packs an accessor's bytes, where the file has them in no other form."""
+    """Name of the extension that compresses an accessor's data, if there is no uncompressed fallback; else None."""
     if not 0 <= accessor < len(gltf.accessors) or gltf.accessors[accessor].bufferView is None:
         return None
     number = gltf.accessors[accessor].bufferView

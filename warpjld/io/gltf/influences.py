@@ -1,4 +1,4 @@
-"""Joints and weights of a skinned primitive: all JOINTS_n and WEIGHTS_n, checked, every vertex with some."""
+"""Joints and weights of a skinned primitive from all JOINTS_n and WEIGHTS_n, validated and completed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ else:
 
 __all__ = ["read_gltf_influences"]
 
-_MOST_SETS = 64  # of four influences: more is no file that anyone made
+_MOST_SETS = 64  # largest number of sets of four influences
 
 
 def read_gltf_influences(
@@ -35,9 +35,9 @@ def read_gltf_influences(
     name: str,
     notes: list[str],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Influencing joints and weights, shape (V, K): unused slots on joint 0 with weight 0, rows summing to one.
+    """Influencing joints and weights, shape (V, K): unused slots have joint 0 and weight 0, rows sum to one.
 
-    A vertex without any weight takes those of the nearest one along the surface that has some.
+    A vertex without weights gets those of the nearest one along the surface that has some.
 
     Args:
         document: The file.
@@ -45,11 +45,11 @@ def read_gltf_influences(
         points: Its vertices, shape (V, 3).
         faces: Its triangles, shape (T, 3).
         joints: Number of the skin's joints.
-        name: The mesh's, for messages.
-        notes: What was mended is added.
+        name: Name of the mesh, for messages.
+        notes: Notes on repairs are appended.
 
     Raises:
-        InputError: No weights, of the wrong shape, negative or not finite, or joints that do not exist.
+        InputError: No weights, wrong shapes, negative or non-finite values, or joints that do not exist.
     """
     index, weight = _all_sets(document, attributes, len(points), name)
     if not np.isfinite(weight).all() or (weight < 0).any():
@@ -96,15 +96,15 @@ def _all_sets(
 def _nearest_weighted(
     points: NDArray[np.float64], faces: NDArray[np.int64], bare: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """For every bare vertex the nearest one with weights, along edges; through space where no edge leads to one."""
+    """For every unweighted vertex the nearest weighted one along edges; in space if no edges lead to one."""
     weighted = np.flatnonzero(~bare)
     wanted = np.flatnonzero(bare)
-    # vertices doubled at a seam are one: joined by edges without length (tiny: zero means "no edge" to scipy)
+    # coincident vertices at seams are joined by edges of tiny length (scipy treats zero as no edge)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     seams = close_pairs(points, 1e-7 * size)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]], seams])
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) + 1e-12 * size
-    # of an edge that two triangles share one entry must stay: duplicates would be added up
+    # one entry per edge, since csr_array sums duplicates
     shortest = {(min(a, b), max(a, b)): d for (a, b), d in zip(edges.tolist(), length.tolist(), strict=True) if a != b}
     pairs = np.array(list(shortest), dtype=np.int64).reshape(-1, 2)
     graph = sp.csr_array((list(shortest.values()), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)

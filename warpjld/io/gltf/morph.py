@@ -1,4 +1,4 @@
-"""Morph targets at their default weights: the shape that a file shows before anything is animated."""
+"""Morph targets at their default weights, which define the displayed shape without animation."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["morphed"]
 def morphed(
     document: Document, primitive: Any, node: int, points: NDArray[np.float64], name: str
 ) -> NDArray[np.float64]:
-    """A primitive's positions with its morph targets added, weighted as the node says, or else its mesh, shape (V, 3).
+    """A primitive's positions with morph targets added, by the weights of the node or else of its mesh, shape (V, 3).
 
     Raises:
-        InputError: Fewer weights than targets, or targets of another shape.
+        InputError: Fewer weights than targets, or targets of wrong shape.
     """
     targets = primitive.targets or []
     mesh = document.gltf.meshes[document.gltf.nodes[node].mesh]

@@ -1,5 +1,4 @@
-"""What of a glTF file's JSON is checked before anything of it is used: kinds, whole numbers, sizes, and where its
-buffers lie."""
+"""Validation of a glTF file's JSON before use: types, integers, sizes, and paths of buffers."""
 
 from __future__ import annotations
 
@@ -20,15 +19,15 @@ _WHOLE = {
     "nodes": ("mesh", "skin", "camera"),
     "skins": ("inverseBindMatrices", "skeleton"),
 }
-"""Numbers that count or name something: whole, and not below 0."""
-_MOST = 2**53  # beyond it JSON's numbers are not whole
+"""Indices and counts: integers that are not negative."""
+_MOST = 2**53  # smallest integer that a JSON number does not represent exactly
 
 
 def check_schema(content: dict[str, Any]) -> None:
-    """Make sure that lists are lists of objects, and that what counts or names something is a whole number from 0 on.
+    """Check that lists are lists of objects, and that indices and counts are non-negative integers.
 
     Raises:
-        InputError: They are not, or there are more nodes than the limit allows; without the file.
+        InputError: They are not, or there are more nodes than the limit allows; without the path.
     """
     for name in _LISTS:
         rows = content.get(name)
@@ -62,10 +61,10 @@ def check_schema(content: dict[str, Any]) -> None:
 
 
 def inside_folder(uri: str) -> str:
-    """The relative path that a buffer's URI means, below the folder of its file.
+    """The relative path of a buffer's URI, inside the folder of its file.
 
     Raises:
-        InputError: It leads elsewhere: a file that is read may not name others of the machine.
+        InputError: It is outside: an input file must not give access to other files of the machine.
     """
     path = unquote(uri)
     parts = (*PurePosixPath(path).parts, *PureWindowsPath(path).parts)

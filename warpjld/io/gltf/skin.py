@@ -1,4 +1,4 @@
-"""glTF skins → :class:`SourceRig`: joints of all skins, skinned meshes placed as the file shows them."""
+"""Reader of skinned meshes of glTF files as :class:`SourceRig`: joints of all skins, meshes as displayed."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["joint_nodes", "joint_tree", "read_gltf_rig"]
 
-_BIND_TOLERANCE = 1e-4  # of the surface's size: where bind and shown pose count as one
+_BIND_TOLERANCE = 1e-4  # largest difference of bind and displayed pose that count as equal, per size of the surface
 
 
 def read_gltf_rig(path: str | Path) -> SourceRig:
     """Read the skinned meshes of a glTF file.
 
-    Vertices are placed by joint · inverse bind matrix: a skinned mesh's own node transform does not count (glTF 2.0
-    §3.7.3.3). Meshes without a skin that hang on a joint follow it rigidly; others are left out, with a note, as are
-    meshes outside the default scene. Morph targets count by their default weights. Faces that a transform mirrors are
-    turned over, so that they stay anticlockwise from outside.
+    Vertices are placed by joint · inverse bind matrix: a skinned mesh's own node transform is ignored (glTF 2.0
+    §3.7.3.3). Meshes without a skin below a joint follow it rigidly; others are left out, with a note, as are meshes
+    outside the default scene. Morph targets are applied at their default weights. Faces that a transform mirrors are
+    flipped, so that they stay anticlockwise seen from outside.
 
     Raises:
-        InputError: Not glTF, no skin, or broken skin data.
+        InputError: Not glTF, no skin, or invalid skin data.
     """
     document = open_document(path)
     with document.reading():
@@ -75,7 +75,7 @@ def _read(document: Document) -> SourceRig:
 
 
 def _mesh_nodes(document: Document, notes: list[str]) -> list[int]:
-    """Nodes with meshes in the default scene; those elsewhere are left out where it holds a skinned one."""
+    """Nodes with meshes in the default scene; those of all scenes if that one shows no skinned mesh."""
     gltf = document.gltf
     holders = [n for n, record in enumerate(gltf.nodes) if record.mesh is not None]
     for n in holders:
@@ -92,7 +92,7 @@ def _mesh_nodes(document: Document, notes: list[str]) -> list[int]:
 
 
 def _subtree(document: Document, node: int) -> list[int]:
-    """A node and all below it."""
+    """A node and all its descendants."""
     out = [node]
     for n in out:
         out.extend(document.gltf.nodes[n].children or ())
@@ -100,7 +100,7 @@ def _subtree(document: Document, node: int) -> list[int]:
 
 
 def joint_nodes(document: Document) -> list[int]:
-    """The nodes that are joints of any skin, in the skins' order.
+    """Indices of nodes that are joints of any skin, in the skins' order.
 
     Raises:
         InputError: A skin without joints, or with one that does not exist.
@@ -117,7 +117,7 @@ def joint_nodes(document: Document) -> list[int]:
 
 
 def joint_tree(document: Document, nodes: list[int]) -> SourceTree:
-    """These nodes as a joint tree, at the pose that the file shows."""
+    """These nodes as a joint tree, in the displayed pose."""
     number = {node: j for j, node in enumerate(nodes)}
     parents = np.full(len(nodes), -1)
     for j, node in enumerate(nodes):
@@ -131,7 +131,7 @@ def joint_tree(document: Document, nodes: list[int]) -> SourceTree:
 def _mesh(
     document: Document, node: int, number: dict[int, int], name: str, notes: list[str]
 ) -> list[tuple[RigMesh, float]]:
-    """The primitives of a mesh, each with how far the pose shown is from the one it was bound in."""
+    """The primitives of a mesh, each with the largest distance between displayed and bind pose."""
     gltf = document.gltf
     record = gltf.nodes[node]
     if record.skin is not None:
@@ -181,7 +181,7 @@ def _primitive(
     mirrored = np.linalg.det(blended[:, :3, :3]) < 0.0
     over = mirrored[faces].sum(axis=1) >= 2
     faces[over] = faces[over][:, ::-1]
-    # one rigid motion of the whole mesh is a placement; several mean that the file shows another pose
+    # a common rigid motion of the mesh is a placement; different ones mean that the displayed pose is not the bind pose
     rigid = transforms[0]
     moved = float(np.abs(placed - (points @ rigid[:3, :3].T + rigid[:3, 3])).max(initial=0.0))
     uv = texture_coordinates(document, primitive, len(points), name)

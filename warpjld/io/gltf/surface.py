@@ -1,7 +1,7 @@
-"""The meshes of a glTF file as a bare surface, without joints: objects, and surfaces that get a skeleton file.
+"""Reader of the meshes of a glTF file without joints, for objects and for surfaces with a separate skeleton file.
 
-Own reader, on the checked accessors that rigs are read with: trimesh's takes strides and offsets as the file has them,
-and a negative one reads memory that is not the file's.
+Own reader, on the validated accessors that rigs are read with: trimesh's uses strides and offsets unchecked, and a
+negative one reads memory outside of the file.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ __all__ = ["read_gltf_surface"]
 
 
 def read_gltf_surface(path: str | Path) -> list[RigMesh]:
-    """Meshes of the default scene, placed by their nodes, each instance by itself; joints and skins do not count.
+    """Meshes of the default scene, placed by their nodes, one per instance; joints and skins are ignored.
 
-    Triangles that a node mirrors are turned over, so that they stay anticlockwise from outside.
+    Triangles that a node mirrors are flipped, so that they stay anticlockwise seen from outside.
 
     Raises:
-        InputError: Not glTF, broken data, or no triangles.
+        InputError: Not glTF, invalid data, or no triangles.
     """
     document = open_document(path)
     with document.reading():

@@ -1,4 +1,4 @@
-"""Texture coordinates of a primitive, in this project's convention: v upwards from the picture's lower left corner."""
+"""Texture coordinates of a glTF primitive, with v upwards from the image's lower left corner."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ __all__ = ["texture_coordinates"]
 
 
 def texture_coordinates(document: Document, primitive: Any, count: int, name: str) -> NDArray[np.float32] | None:
-    """Coordinates that the base colour of the primitive's material uses, shape (V, 2); None where there are none.
+    """Coordinates used by the base colour texture of the primitive's material, shape (V, 2); None without any.
 
-    ``KHR_texture_transform`` is applied: coordinates are those at which the picture itself is read.
+    ``KHR_texture_transform`` is applied.
 
     Raises:
-        InputError: As many as vertices are wanted.
+        InputError: Their number differs from that of vertices.
     """
     info = _base_colour(document, primitive)
     moved = (info.extensions or {}).get("KHR_texture_transform", {}) if info is not None else {}

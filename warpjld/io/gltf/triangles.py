@@ -1,4 +1,4 @@
-"""Positions and triangles of a glTF primitive, checked: lists, strips and fans."""
+"""Positions and triangles of a glTF primitive, validated; lists, strips and fans."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # primitive modes of glTF
 
 
 def is_surface(primitive: Any) -> bool:
-    """Whether a primitive is made of triangles, rather than points or lines."""
+    """Whether a primitive consists of triangles, not points or lines."""
     return primitive.mode is None or primitive.mode in (_TRIANGLES, _STRIP, _FAN)
 
 
 def primitive_points(document: Document, primitive: Any, node: int, name: str) -> NDArray[np.float64]:
-    """Positions with the morph targets at their default weights, shape (V, 3).
+    """Positions with morph targets at their default weights, shape (V, 3).
 
     Raises:
-        InputError: There are none, they are no triples, or not finite.
+        InputError: No positions, wrong type, or not finite.
     """
     position = vars(primitive.attributes).get("POSITION")
     if position is None:
@@ -42,10 +42,10 @@ def primitive_points(document: Document, primitive: Any, node: int, name: str) -
 
 
 def primitive_triangles(document: Document, primitive: Any, count: int, name: str) -> NDArray[np.int64]:
-    """Triangles over ``count`` vertices, anticlockwise as the file has them, shape (T, 3).
+    """Triangles over ``count`` vertices, oriented as in the file, shape (T, 3).
 
     Raises:
-        InputError: Indices that are no unsigned integers, beyond the vertices, or no whole triangles.
+        InputError: Indices that are no unsigned integers, out of range, or not a multiple of three.
     """
     if primitive.indices is None:
         corners = np.arange(count)

@@ -1,1 +1,1 @@
-"""Reading OpenUSD: stages (:mod:`stage`), joint trees (:mod:`skeletons`), meshes (:mod:`mesh`), rigs (:mod:`skin`)."""
+"""Reader of OpenUSD: stages (:mod:`stage`), joint trees (:mod:`skeletons`), meshes (:mod:`mesh`), :mod:`skin`."""

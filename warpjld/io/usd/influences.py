@@ -1,4 +1,4 @@
-"""Joint influences and blend shapes of a skinned mesh."""
+"""Joint influences and blend shapes of a skinned UsdSkel mesh."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ __all__ = ["Influences", "blended_points", "read_usd_influences"]
 
 Influences = tuple[NDArray[np.int64], NDArray[np.float64], int]
 """Joints of the whole tree and weights per vertex, shape (V, K), unused slots with weight 0 and rows summing to one;
-and the joint that the whole mesh follows rigidly, -1 for none."""
+and the joint that the whole mesh follows rigidly, or -1."""
 
 
 def read_usd_influences(
     file: UsdFile, skeleton: UsdSkeleton, query: Any, points: NDArray[np.float64], where: str
 ) -> Influences:
-    """``primvars:skel:jointIndices`` and ``jointWeights`` of a mesh, in whatever joint order it has them.
+    """``primvars:skel:jointIndices`` and ``jointWeights`` of a mesh, mapped from its own joint order.
 
     Raises:
-        InputError: Sizes that do not fit, joints that the skeleton lacks, weights that are no weights.
+        InputError: Sizes that do not match, joints that the skeleton lacks, or invalid weights.
     """
     width = query.GetNumInfluencesPerComponent()
     index = _flat(query.GetJointIndicesPrimvar(), np.int64)
@@ -62,11 +62,11 @@ def read_usd_influences(
 
 
 def blended_points(file: UsdFile, skeleton: UsdSkeleton, query: Any, points: Any) -> NDArray[np.float64]:
-    """Points with the blend shapes at the weights that the bound animation holds by default, not over time.
+    """Points with blend shapes at the default weights of the bound animation (not time samples), shape (V, 3).
 
     Args:
         file: The stage.
-        skeleton: What the mesh is bound to.
+        skeleton: The skeleton that the mesh is bound to.
         query: The mesh's skinning query.
         points: Points without blend shapes, shape (V, 3).
     """
@@ -103,7 +103,7 @@ def _flat(primvar: Any, kind: type) -> NDArray[Any]:
 
 
 def _joint_numbers(file: UsdFile, skeleton: UsdSkeleton, query: Any, where: str) -> NDArray[np.int64]:
-    """Joint of the skeleton for each joint of the mesh's own order, -1 where it has none."""
+    """Joint of the skeleton for each joint of the mesh's own order, -1 for missing ones."""
     from pxr import UsdSkel
 
     own = query.GetJointOrder()
@@ -118,7 +118,7 @@ def _joint_numbers(file: UsdFile, skeleton: UsdSkeleton, query: Any, where: str)
 def _normalised(
     file: UsdFile, index: NDArray[np.int64], weight: NDArray[np.float64], points: NDArray[np.float64], where: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Weights that sum to one; vertices without any take those of the nearest that has some."""
+    """Normalised weights; unweighted vertices get those of the nearest weighted one."""
     total = weight.sum(axis=1)
     bare = total <= 0.0
     if bare.all():

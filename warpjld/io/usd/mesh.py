@@ -1,4 +1,4 @@
-"""UsdGeom meshes → triangles with texture coordinates."""
+"""Triangulation of UsdGeom meshes, with texture coordinates."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["UsdMesh", "default_or_first", "read_usd_mesh"]
 
 @dataclass(frozen=True, eq=False)
 class UsdMesh:
-    """A mesh in its own space.
+    """A mesh in local coordinates.
 
     Attributes:
         points: Vertex positions, shape (V, 3).
         faces: Triangles, anticlockwise seen from outside, shape (S, 3).
         uv: Texture coordinates of every triangle's corners, shape (S, 3, 2), or None.
-        polygons: Face of the file that each triangle is a part of, shape (S,).
-        polygon_count: How many faces the file has.
+        polygons: Face of the file that each triangle is part of, shape (S,).
+        polygon_count: Number of faces in the file.
     """
 
     points: NDArray[np.float64]
@@ -35,10 +35,10 @@ class UsdMesh:
 
 
 def read_usd_mesh(file: UsdFile, prim: Any) -> UsdMesh:
-    """The control mesh of a ``UsdGeom.Mesh``, whatever its subdivision scheme, at its default time.
+    """The control mesh of a ``UsdGeom.Mesh`` at its default time, regardless of its subdivision scheme.
 
     Raises:
-        InputError: Points that are missing or not finite, or faces that do not fit them.
+        InputError: Points that are missing or not finite, or faces that do not match them.
     """
     from pxr import UsdGeom
 
@@ -72,7 +72,7 @@ def read_usd_mesh(file: UsdFile, prim: Any) -> UsdMesh:
 
 
 def default_or_first(attribute: Any) -> Any:
-    """An attribute's default value, or its first time sample where it has none."""
+    """An attribute's default value, or its first time sample if it has none."""
     from pxr import Usd
 
     value = attribute.Get()

@@ -1,8 +1,8 @@
-"""UsdSkel skeletons → one joint tree, the same for rigs and animations.
+"""UsdSkel skeletons of a stage as one joint tree, the same for rigs and animations.
 
-Skeletons that skin a mesh count; where none does, all do. USD names joints by their path in the skeleton
-(``Hips/Spine/Neck``): a joint's name is the last element, preceded by those above it where that is not unique, unless
-the skeleton has ``jointNames``.
+Only skeletons that skin a mesh are used, unless none does. USD names joints by their path in the skeleton
+(``Hips/Spine/Neck``): a joint's name is the last element, prefixed by its ancestors' if that is not unique, unless the
+skeleton has ``jointNames``.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["UsdSkeleton", "UsdSkeletons", "concatenated", "read_skeletons"]
 
 _SAME = 1e-4
-"""Transforms that differ by less, relative to the skeleton's size, are the same."""
+"""Largest difference of transforms that count as equal, per size of the skeleton."""
 
 
 @dataclass(frozen=True, eq=False)
 class UsdSkeleton:
-    """One skeleton of J joints of a stage.
+    """A skeleton of J joints of a stage.
 
     Attributes:
         prim: Its prim.
-        tokens: USD's names of its joints: their paths.
+        tokens: USD's joint tokens: their paths.
         parents: Parent of every joint, -1 for none, shape (J,).
-        bind: Joint transforms at which the skin was bound, in the space of ``to_world``, shape (J, 4, 4).
-        local_rest: Joint-to-parent transforms of joints that no animation moves, shape (J, 4, 4).
-        to_world: What brings ``bind`` and bound vertices to the stage's world, shape (4, 4).
-        first: Number of its first joint in the whole tree.
+        bind: Bind transforms of the joints, in the space of ``to_world``, shape (J, 4, 4).
+        local_rest: Joint-to-parent transforms of joints that are not animated, shape (J, 4, 4).
+        to_world: Transform of ``bind`` and bound vertices to the stage's world, shape (4, 4).
+        first: Index of its first joint in the whole tree.
         meshes: ``UsdSkel.SkinningQuery`` of every mesh it skins.
     """
 
@@ -55,7 +55,7 @@ class UsdSkeleton:
 
     @property
     def animation(self) -> Any:
-        """The ``SkelAnimation`` prim bound to it, invalid where there is none."""
+        """The ``SkelAnimation`` prim bound to it, an invalid prim if there is none."""
         from pxr import UsdSkel
 
         return UsdSkel.BindingAPI(self.prim).GetInheritedAnimationSource()
@@ -68,14 +68,14 @@ class UsdSkeleton:
 
 @dataclass(frozen=True, eq=False)
 class UsdSkeletons:
-    """The skeletons of a stage, and their joints as one tree."""
+    """The skeletons of a stage, and all their joints as one tree."""
 
     tree: SourceTree
     skeletons: tuple[UsdSkeleton, ...]
 
 
 def read_skeletons(file: UsdFile) -> UsdSkeletons | None:
-    """The stage's skeletons; None where there are none.
+    """The stage's skeletons; None if there are none.
 
     Raises:
         InputError: A skeleton without joints, or without transforms for them.
@@ -96,7 +96,7 @@ def read_skeletons(file: UsdFile) -> UsdSkeletons | None:
 
 
 def _bindings(file: UsdFile) -> list[tuple[Any, list[Any]]]:
-    """Every skeleton's prim and the meshes it skins, in the stage's order."""
+    """Every skeleton's prim and the skinning queries of its meshes, in the stage's order."""
     from pxr import Usd, UsdSkel
 
     cache = UsdSkel.Cache()
@@ -114,7 +114,7 @@ def _bindings(file: UsdFile) -> list[tuple[Any, list[Any]]]:
             path = str(binding.GetSkeleton().GetPath())
             for mesh in binding.GetSkinningTargets():
                 target = str(mesh.GetPrim().GetPath())
-                if path in found and target not in seen:  # roots may lie inside one another
+                if path in found and target not in seen:  # SkelRoots may be nested
                     found[path][1].append(mesh)
                 seen.add(target)
     return list(found.values())
@@ -147,7 +147,7 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
         file.notes.append(f"skeleton '{path}' has no bindTransforms for its joints: restTransforms are taken")
         bind = rest
     to_world = usd_matrices(UsdGeom.XformCache(Usd.TimeCode.EarliestTime()).GetLocalToWorldTransform(prim))
-    if rest is not None and _is_placed(bind, rest, to_world):  # bound in the world, as USD's documentation words it
+    if rest is not None and _is_placed(bind, rest, to_world):  # in world space, as USD's documentation says
         to_world = np.eye(4)
     with np.errstate(invalid="ignore"):
         regular = _regular(np.asarray(to_world @ bind))
@@ -163,14 +163,14 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
 
 
 def _regular(transforms: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which transforms (J, 4, 4) are finite and can be inverted."""
+    """Mask of transforms (J, 4, 4) that are finite and invertible."""
     finite = np.asarray(np.isfinite(transforms).all(axis=(1, 2)))
     linear = np.where(finite[:, None, None], transforms, 0.0)[:, :3, :3]
     return np.asarray(np.abs(np.linalg.det(linear)) > 1e-12 * np.linalg.norm(linear, axis=(1, 2)) ** 3)
 
 
 def _parents(tokens: tuple[str, ...]) -> NDArray[np.int64]:
-    """The nearest joint above each in its path, -1 for none: as ``UsdSkel.Topology``, for names it refuses too."""
+    """Nearest ancestor in each joint's path, -1 for none, as ``UsdSkel.Topology`` but for names it rejects, too."""
     number = {token: j for j, token in enumerate(tokens)}
     out = np.full(len(tokens), -1, dtype=np.int64)
     for j, token in enumerate(tokens):
@@ -182,7 +182,7 @@ def _parents(tokens: tuple[str, ...]) -> NDArray[np.int64]:
 
 
 def concatenated(local: NDArray[np.float64], parents: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Joint-to-parent transforms, shape (…, J, 4, 4) → joint-to-skeleton transforms, joints in any order."""
+    """Joint-to-skeleton transforms from joint-to-parent ones, shape (…, J, 4, 4), joints in any order."""
     out = local.copy()
     done = parents < 0
     while not done.all():
@@ -193,7 +193,7 @@ def concatenated(local: NDArray[np.float64], parents: NDArray[np.int64]) -> NDAr
 
 
 def _is_placed(bind: NDArray[np.float64], rest: NDArray[np.float64], to_world: NDArray[np.float64]) -> bool:
-    """Whether the bind pose is the rest pose with the skeleton's own place in the world already applied."""
+    """Whether bind transforms include the skeleton's own transform to the world."""
     size = float(np.ptp(bind[:, :3, 3], axis=0).max()) or 1.0
     scale = np.array([[1.0, 1.0, 1.0, size]] * 3)
 
@@ -216,7 +216,7 @@ def _names(skeletons: list[UsdSkeleton]) -> list[str]:
 
 
 def _own_names(skeleton: UsdSkeleton) -> list[str]:
-    """``jointNames``, which hold what USD's paths cannot, where there is a different one for every joint."""
+    """``jointNames`` if complete and unique (they may contain characters that USD's paths cannot), else from paths."""
     from pxr import UsdSkel
 
     given = [str(name) for name in UsdSkel.Skeleton(skeleton.prim).GetJointNamesAttr().Get() or ()]
@@ -226,7 +226,7 @@ def _own_names(skeleton: UsdSkeleton) -> list[str]:
 
 
 def _shortest(tokens: tuple[str, ...]) -> list[str]:
-    """The shortest ends of joint paths that tell the joints of a skeleton apart."""
+    """The shortest suffixes of joint paths that are unique in a skeleton."""
     paths = [token.split("/") for token in tokens]
     length = [1] * len(paths)
     while True:

@@ -1,4 +1,4 @@
-"""UsdSkel rigs → :class:`SourceRig`: joints of all skeletons, skinned meshes where they were bound."""
+"""Reader of UsdSkel rigs as :class:`SourceRig`: joints of all skeletons, skinned meshes in bind pose."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ __all__ = ["read_usd_rig"]
 def read_usd_rig(path: str | Path) -> SourceRig:
     """Read the skinned meshes of a USD stage at their bind pose.
 
-    A vertex lies at to-world · geomBindTransform · point, with the skeleton's place as to-world: a skinned mesh's own
-    transform does not count. Blend shapes are at the weights the animation holds by default. Meshes without joints,
-    invisible ones and guides are left out, with a note.
+    A vertex is at to-world · geomBindTransform · point, with the skeleton's transform as to-world: a skinned mesh's own
+    transform is ignored. Blend shapes have the animation's default weights. Meshes without joints, invisible ones and
+    guides are left out, with a note.
 
     Raises:
-        InputError: No USD file, no skeleton, or broken skin data.
+        InputError: Not a USD file, no skeleton, or invalid skin data.
         MissingExtraError: OpenUSD is not installed.
     """
     with open_usd(path) as file:
@@ -70,7 +70,7 @@ def _meshes(file: UsdFile, found: UsdSkeletons) -> list[RigMesh]:
 
 
 def _hidden(prim: Any) -> str:
-    """Why a mesh does not belong to what the stage shows; "" where it does."""
+    """Why a mesh is not displayed by the stage, for the user; "" if it is."""
     from pxr import Usd, UsdGeom
 
     imageable = UsdGeom.Imageable(prim)

@@ -1,4 +1,4 @@
-"""Opening USD stages: what OpenUSD complains of becomes one error, or notes."""
+"""Opening of USD stages; OpenUSD's diagnostics become one error, or notes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from warpjld.limits import check_limit
 
 __all__ = ["UsdFile", "open_usd", "usd_matrices"]
 
-_MOST_WARNINGS = 5  # of OpenUSD's that are passed on
+_MOST_WARNINGS = 5  # largest number of OpenUSD's warnings that are passed on
 _PLACE = re.compile(r"^Error in '[^']*' at line \d+ in file \S+ : '(.*?)'?$")
 
 
@@ -30,10 +30,10 @@ class UsdFile:
 
     Attributes:
         path: The file.
-        stage: Its ``Usd.Stage``, everything loaded, variants as the file selects them.
-        metres: Metres a unit of length is, where the file says so.
-        up: ``y`` or ``z``, where the file says so.
-        notes: What was mended or left out so far.
+        stage: Its ``Usd.Stage``, fully loaded, with the file's variant selections.
+        metres: The unit of length [m], or None if not stated.
+        up: ``y`` or ``z``, or None if not stated.
+        notes: What was repaired or left out so far.
     """
 
     path: Path
@@ -43,14 +43,14 @@ class UsdFile:
     notes: list[str] = field(default_factory=list)
 
     def prims(self) -> list[Any]:
-        """All active, defined, loaded prims, those of instances included."""
+        """All active, defined, loaded prims, including those of instances."""
         from pxr import Usd
 
         return list(Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()))
 
 
 def _check_content(path: Path) -> None:
-    """Refuse what OpenUSD takes for ever to refuse, or unpacks without end."""
+    """Reject content that OpenUSD would take very long to reject, or would unpack without limit."""
     raw = read_bytes(path)
     if raw.startswith(b"#usda"):
         check_limit("depth", nesting(raw, b"[{(", b"]})"), of="brackets", path=path)
@@ -60,10 +60,10 @@ def _check_content(path: Path) -> None:
 
 @contextmanager
 def open_usd(path: str | Path) -> Iterator[UsdFile]:
-    """A stage to read within the statement; OpenUSD's warnings become notes instead of text on stderr.
+    """Context with an open stage; OpenUSD's warnings become notes instead of text on stderr.
 
     Raises:
-        InputError: No USD file, a reference that cannot be found, or what OpenUSD refuses while it is read.
+        InputError: Not a USD file, an unresolved reference, or an error of OpenUSD while reading.
         MissingExtraError: OpenUSD is not installed.
     """
     path = Path(path)
@@ -92,7 +92,7 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
     except Tf.ErrorException as error:
         raise InputError(f"OpenUSD cannot read it: {_reason(_told(error))}", path=path) from None
     except (AttributeError, IndexError, KeyError, OverflowError, TypeError, ValueError) as error:
-        # a stage may declare any attribute as any type: what the schema forbids shows only where it is used
+        # a stage may declare attributes with wrong types, which raises only where they are used
         raise InputError(
             f"an attribute is not of the type that UsdSkel wants: {_line(str(error))}", path=path
         ) from error
@@ -101,14 +101,14 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
 
 
 def usd_matrices(values: Any) -> NDArray[np.float64]:
-    """One Gf.Matrix4d or an array of them, vectors as columns (USD: rows), shape (4, 4) or (N, 4, 4)."""
+    """A Gf.Matrix4d or an array of them, transposed to column vectors (USD: row vectors), (4, 4) or (N, 4, 4)."""
     return np.array(values, dtype=np.float64).swapaxes(-1, -2)
 
 
 def _told(error: Exception) -> str:
     try:
         return str(error)
-    except UnicodeDecodeError:  # it cites the file
+    except UnicodeDecodeError:  # the message quotes the file
         return "text that is not UTF-8"
 
 

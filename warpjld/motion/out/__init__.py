@@ -1,4 +1,4 @@
-"""Motions out: poses, on the rig's own joints, in the files that animation programs read."""
+"""Export of poses, on the rig's own joints, to motion files of animation programs."""
 
 from __future__ import annotations
 

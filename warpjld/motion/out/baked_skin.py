@@ -1,4 +1,4 @@
-"""Skin weights and corrective shapes that take the place of a rig's own in the files it is written to."""
+"""Baked skin weights and corrective shapes that replace a rig's own in exported files."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ __all__ = ["BakedSkin"]
 
 @dataclass(frozen=True, eq=False)
 class BakedSkin:
-    """A skin over the N joints of a rig's file, and K shapes that are added before it.
+    """Skin weights over the N joints of a rig's file, and K corrective shapes applied before skinning.
 
     Attributes:
         joints: Joints of every welded vertex, shape (V, 4 k).
         weights: Their weights, rows summing to one, shape (V, 4 k).
         names: Names of the shapes.
         shapes: Displacements of the welded vertices at rest [m], shape (K, V, 3).
-        at_rest: Weights of the shapes where nothing animates them, shape (K,).
+        at_rest: Weights of the shapes without animation, shape (K,).
         over_time: Weights of the shapes at the frames of the motion, shape (F, K).
     """
 

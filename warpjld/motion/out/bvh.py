@@ -1,9 +1,9 @@
-"""Writing BVH: the rig's own joints as a hierarchy of offsets, then a line of channel values a frame.
+"""Writer of BVH files: the rig's own joints as a hierarchy of offsets, then a line of channel values per frame.
 
-Lengths are metres and Y is up, whatever the rig's file has. A joint without rotation is at rest, and its axes are the
-world's, as is usual for BVH: OFFSETs are differences of rest positions. The root's OFFSET is 0, so that readers that
-add its position channels to it and those that replace it by them agree. Joints whose distance to their parent changes
-over the clip have position channels too; these replace the OFFSET, as Blender, Maya and MotionBuilder read them.
+Lengths are metres and Y is up, whatever the rig's file has. Zero rotations are the rest pose, and joint axes are the
+world's, as usual for BVH: OFFSETs are differences of rest positions. The root's OFFSET is 0, so that readers that add
+its position channels to it and readers that replace it by them agree. Joints whose distance to their parent changes
+over the clip have position channels, too; these replace the OFFSET, as Blender, Maya and MotionBuilder read them.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ __all__ = ["write_bvh"]
 
 _POSITION = "Xposition Yposition Zposition"
 _ROTATION = "Zrotation Xrotation Yrotation"
-_CONSTANT = 1e-6  # of the rig's size: a distance that changes by less is constant
-_STUB = 0.02  # of the rig's size: the end site of a joint about whose bone nothing is known
+_CONSTANT = 1e-6  # largest change of an offset that counts as constant, per size of the rig
+_STUB = 0.02  # length of the end site of a joint without a bone, per size of the rig
 
 
 @dataclass(frozen=True)
 class _Joint:
-    """A joint as it stands in the file; ``source`` is the motion's, -1 for the root that joins several."""
+    """A joint of the file; ``source`` is its index in the motion, -1 for an added common root."""
 
     name: str
     source: int
@@ -45,9 +45,9 @@ class _Joint:
 
 
 def write_bvh(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a motion of a rig's own joints as BVH; a :class:`~warpjld.motion.out.write.Writer`.
+    """Write a motion of a rig's own joints as BVH; a :class:`~warpjld.motion.out.write.MotionWriter`.
 
-    BVH holds one hierarchy, so several roots get one above them, at the origin.
+    BVH holds one hierarchy, so several roots get a common parent at the origin.
     """
     motion = source_motion(rig, poses)
     notes = list(motion.notes)
@@ -68,7 +68,7 @@ def write_bvh(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMoti
 
 
 def _hierarchy(motion: SourceMotion, rig: Rig, notes: list[str]) -> list[_Joint]:
-    """Joints depth first, as the file nests them."""
+    """Joints in depth-first order, as they are nested in the file."""
     tree = motion.tree
     at = motion.rest_frames[:, :3, 3]
     names = _names(tree.names, notes)
@@ -93,7 +93,7 @@ def _hierarchy(motion: SourceMotion, rig: Rig, notes: list[str]) -> list[_Joint]
 
 
 def _names(names: tuple[str, ...], notes: list[str]) -> list[str]:
-    """Names that readers, which split at blanks and look joints up by name, take for what they are."""
+    """Unique names without characters that BVH readers split at; changes are noted."""
     out: list[str] = []
     for j, name in enumerate(names):
         plain = "_".join(name.replace("{", "(").replace("}", ")").split()) or f"joint{j}"
@@ -109,7 +109,7 @@ def _names(names: tuple[str, ...], notes: list[str]) -> list[str]:
 
 
 def _end(motion: SourceMotion, rig: Rig, source: int, at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Offset of the end site of a joint without children: a tip that was added, or on along the bone before."""
+    """Offset of a leaf's end site: to a tip added in recognition, or a continuation of the bone before."""
     if source in rig.sources:
         tips = [c for c in rig.skeleton.children[rig.sources.index(source)] if rig.sources[c] < 0]
         if tips:
@@ -121,7 +121,7 @@ def _end(motion: SourceMotion, rig: Rig, source: int, at: NDArray[np.float64]) -
 
 
 def _moving(motion: SourceMotion, joints: list[_Joint]) -> NDArray[np.bool_]:
-    """Which joints need position channels: the root, and those whose place relative to their parent changes."""
+    """Mask of joints that need position channels: roots, and joints whose position relative to their parent changes."""
     offsets = np.array([joint.offset for joint in joints])
     size = float(np.linalg.norm(np.ptp(motion.rest_frames[:, :3, 3], axis=0))) or 1.0
     moving = np.array([joint.parent < 0 for joint in joints])
@@ -134,7 +134,7 @@ def _moving(motion: SourceMotion, joints: list[_Joint]) -> NDArray[np.bool_]:
 def _local(
     motion: SourceMotion, joints: list[_Joint], frames: slice
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places [m] and rotations relative to the parent, in axes of the rest pose, shapes (f, B, 3) and (f, B, 4)."""
+    """Positions [m] and rotations relative to the parent, in axes of the rest pose, shapes (f, B, 3) and (f, B, 4)."""
     count = frames.stop - frames.start
     world = np.zeros((count, len(joints), 4))
     world[..., 3] = 1.0
@@ -169,7 +169,7 @@ def _write_hierarchy(file: TextIO, joints: list[_Joint], moving: NDArray[np.bool
 
 
 def _write_frames(file: TextIO, motion: SourceMotion, joints: list[_Joint], moving: NDArray[np.bool_]) -> None:
-    """Stream the frames; places to a hundredth of a micrometre, angles to a millionth of a degree."""
+    """Write the frames block by block; positions to 1e-8 m, angles to 1e-6 degrees."""
     line = " ".join("%.8f %.8f %.8f %.6f %.6f %.6f" if moves else "%.6f %.6f %.6f" for moves in moving) + "\n"
     keep = np.concatenate([[moves] * 3 + [True] * 3 for moves in moving])
     euler = ContinuousEuler(len(joints))
@@ -177,7 +177,7 @@ def _write_frames(file: TextIO, motion: SourceMotion, joints: list[_Joint], movi
         places, turns = _local(motion, joints, block)
         matrices = Rotation.from_quat(turns.reshape(-1, 4)).as_matrix().reshape(*turns.shape[:2], 3, 3)
         rows = np.concatenate([places, np.degrees(euler(matrices))], axis=-1).reshape(len(places), -1)[:, keep]
-        # + 0.0: no minus signs before zeros
+        # + 0.0 turns -0.0 into 0.0
         file.writelines(line % tuple(row) for row in (np.round(rows, 9) + 0.0).tolist())
 
 

@@ -1,4 +1,4 @@
-"""Rotations as Euler angles that do not jump from frame to frame."""
+"""Conversion of rotations to Euler angles that are continuous over frames."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from numpy.typing import NDArray
 
 __all__ = ["ContinuousEuler"]
 
-_LOCKED = 1e-7  # cosine of the middle angle below which the other two are one
+_LOCKED = 1e-7  # cosine of the middle angle below which the others are not determined separately (gimbal lock)
 _TURN = 2.0 * np.pi
 
 
 class ContinuousEuler:
-    """Angles z, x, y with R = Rz(z) Rx(x) Ry(y) of B joints, frame after frame.
+    """Angles z, x, y with R = Rz(z) Rx(x) Ry(y) of B joints, computed frame after frame.
 
-    Every rotation has two such triples, and whole turns besides: the one nearest to the frame before is taken (the
-    first frame: nearest to zero). Where x is ±90°, z stays as it was and y takes the rest.
+    Every rotation has two such triples, up to whole turns: the one nearest to the previous frame is taken (in the first
+    frame, nearest to zero). In gimbal lock (x = ±90°) z is kept and y takes the rest.
     """
 
     def __init__(self, joints: int) -> None:
         self._last = np.zeros((joints, 3))
 
     def __call__(self, matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angles z, x, y [rad] of the frames that follow, shape (f, B, 3), from matrices (f, B, 3, 3)."""
+        """Angles z, x, y [rad] of the next f frames, shape (f, B, 3), from matrices (f, B, 3, 3)."""
         r = matrices
         cosine = np.hypot(r[..., 0, 1], r[..., 1, 1])
         first = np.stack(
@@ -59,5 +59,5 @@ class ContinuousEuler:
         return np.where(closer[:, None], a, b)
 
     def _near(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same angles, whole turns away, within half a turn of the last ones."""
+        """The same angles, shifted by whole turns to within half a turn of the previous ones."""
         return angles - _TURN * np.round((angles - self._last) / _TURN)

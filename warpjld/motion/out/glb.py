@@ -1,9 +1,9 @@
-"""Writing binary glTF with animated joints: the rig's own file with a further animation, or a new one.
+"""Writer of binary glTF with animated joints: the rig's own file with an added animation, or a new file.
 
-A rig that was read from glTF keeps its file as it is, meshes, materials, skins and nodes to the letter; the new
-animation stands before the file's own ones, since programs play the first. Any other rig becomes a file of its own:
-the surface, a skin and the joints in metres with Y up. Rotations turn every joint, translations are there only for
-those that move against their parent, and scale stays as at rest. Time starts at 0.
+For a rig that was read from glTF, the file is kept unchanged with its meshes, materials, skins and nodes; the new
+animation is put before its own ones, since programs play the first. For any other rig a new file is made: the surface,
+a skin and the joints in metres with Y up. All joints have rotation channels; translation channels are written only for
+joints that move relative to their parent; scale stays as at rest. Time starts at 0.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from warpjld.skeleton import Poses
 
 __all__ = ["animate", "write_glb"]
 
-_CONSTANT = 1e-7  # of the joints' size: those that stray by less from their place under their parent stay there
-_SHEARED = 1e-3  # of a joint's scale
+_CONSTANT = 1e-7  # largest translation relative to the parent that counts as constant, per size of the joints
+_SHEARED = 1e-3  # smallest shear that is reported, per scale of the joint
 
 
 def write_glb(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a motion of a rig's own joints as binary glTF; a :class:`~warpjld.motion.out.write.Writer`."""
+    """Write a motion of a rig's own joints as binary glTF; a :class:`~warpjld.motion.out.write.MotionWriter`."""
     motion = source_motion(rig, poses)
     notes = list(motion.notes)
     warnings: list[str] = []
@@ -52,7 +52,7 @@ def animate(
     warnings: list[str],
     baked: BakedSkin | None = None,
 ) -> None:
-    """Add an animation of the joints, and of baked shapes, before those that the file has."""
+    """Add an animation of the joints, and of baked shapes, before those of the file."""
     count, frames = len(nodes.joints), len(motion)
     at = nodes.joints
     given = np.isin(np.arange(len(nodes.parents)), at)
@@ -100,7 +100,7 @@ def animate(
 
 
 def _continuous(rotations: NDArray[np.float32]) -> None:
-    """Signs such that every rotation is interpolated the short way, in place, shape (F, N, 4)."""
+    """Flip quaternion signs such that consecutive frames interpolate the short way, in place, shape (F, N, 4)."""
     for frame in range(1, len(rotations)):
         far = (rotations[frame] * rotations[frame - 1]).sum(-1) < 0.0
         rotations[frame][far] *= -1.0

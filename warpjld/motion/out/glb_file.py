@@ -1,7 +1,7 @@
-"""A GLB file as it is stored: JSON, and one binary chunk that grows by arrays.
+"""A GLB file as JSON and one binary chunk, to which arrays can be appended.
 
-The JSON is kept as it is read, not as objects of pygltflib, which would lose what that library does not know and add
-its defaults: a user's file keeps its materials, extensions and extras to the letter.
+The JSON is kept as read, not as objects of pygltflib, which would drop what that library does not know and add its
+defaults: a user's file keeps its materials, extensions and extras unchanged.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LARGEST = 2**32 - 1  # lengths are 32 bit
 
 
 def read_gltf_json(data: bytes) -> dict[str, Any]:
-    """The JSON of a .glb or .gltf file that was opened before, and so is sound."""
+    """The JSON of a .glb or .gltf file that was validated before."""
     if data[:4] == b"glTF":
         (length,) = struct.unpack_from("<I", data, 12)
         data = data[20 : 20 + length]
@@ -33,10 +33,10 @@ def read_gltf_json(data: bytes) -> dict[str, Any]:
 
 
 class GlbFile:
-    """JSON and binary content; ``add`` appends an array to both."""
+    """JSON and binary content of a GLB file; ``add`` appends an array to both."""
 
     def __init__(self, content: dict[str, Any], chunks: list[bytes]) -> None:
-        """Take over ``content``, whose buffers are ``chunks``: they become one."""
+        """Take ownership of ``content``, whose buffers are ``chunks``; these are merged into one buffer."""
         self.content = content
         self._chunks: list[bytes] = []
         self._length = 0
@@ -46,27 +46,27 @@ class GlbFile:
             view["buffer"] = 0
 
     def append(self, data: bytes) -> int:
-        """Put bytes behind the others, at a multiple of four; returns where they begin."""
+        """Append bytes at a multiple of four; returns their offset."""
         start = self._length
         self._chunks.append(data + b"\0" * (-len(data) % 4))
         self._length += len(self._chunks[-1])
         return start
 
     def add_view(self, data: bytes, target: int | None = None) -> int:
-        """A buffer view of new bytes; returns its number."""
+        """Add a buffer view of new bytes; returns its index."""
         view = {"buffer": 0, "byteOffset": self.append(data), "byteLength": len(data)}
         if target is not None:
             view["target"] = target
         return self._add("bufferViews", view)
 
     def add(self, array: NDArray[Any], kind: str, *, target: int | None = None, bounds: bool = False) -> int:
-        """An accessor of a new array, of float32, uint32 or uint16; returns its number.
+        """Add an accessor of a new float32, uint32 or uint16 array; returns its index.
 
         Args:
-            array: The array, one row an element.
+            array: The array, one element per row.
             kind: ``SCALAR``, ``VEC3``, ….
             target: ``ARRAY_BUFFER`` for vertex attributes, ``ELEMENT_ARRAY_BUFFER`` for indices.
-            bounds: Whether smallest and largest values are stored, as for positions and times.
+            bounds: Whether minimum and maximum are stored, as for positions and times.
         """
         accessor: dict[str, Any] = {
             "bufferView": self.add_view(np.ascontiguousarray(array).tobytes(), target),
@@ -83,8 +83,8 @@ class GlbFile:
         """Write the file.
 
         Raises:
-            InputError: It would be longer than the format allows.
-            OSError: The disk refuses.
+            InputError: It would exceed the format's largest length.
+            OSError: Writing fails.
         """
         self.content["buffers"] = [{"byteLength": self._length}]
         text = json.dumps(self.content, ensure_ascii=False, separators=(",", ":")).encode("utf-8")

@@ -1,4 +1,4 @@
-"""A glTF document of a rig that came from elsewhere: its surface, a skin, and its joints in metres with Y up."""
+"""A new glTF document of a rig: its surface, a skin, and its joints in metres with Y up."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ def new_document(
     notes: list[str],
     baked: BakedSkin | None = None,
 ) -> tuple[GlbFile, NodeTree]:
-    """A document with the rig at rest, and its nodes; the mesh's node follows those of the joints.
+    """A document of the rig at rest, and its nodes; the mesh's node follows those of the joints.
 
     Args:
         rig: The rig.
         motion: Motion of its joints.
-        notes: What whoever opens the file should know is added.
-        baked: Skin weights in place of the rig's own, with morph targets.
+        notes: Notes for users of the file are appended.
+        baked: Skin weights that replace the rig's own, with morph targets.
     """
     rest_worlds = motion.rest_frames.copy()
-    # joints keep the axes that the file gives them, but no scale: nothing is left for it to do
+    # joints keep the file's axes but not its scale, which has no effect here
     rest_worlds[:, :3, :3] = nearest_rotations(rest_worlds[:, :3, :3])
     parents = motion.tree.parents
     rest = rest_worlds.copy()
@@ -54,7 +54,7 @@ def new_document(
         "nodes": nodes,
         "meshes": [_mesh(file, rig, motion, baked, notes)],
         "skins": [{"joints": list(range(count)), "inverseBindMatrices": file.add(binds, "MAT4")}],
-        # without one, glTF's default is bare metal
+        # the default material of glTF is metallic
         "materials": [
             {
                 "name": "skin",
@@ -86,7 +86,7 @@ def _node(name: str, rest: NDArray[np.float64], children: tuple[int, ...]) -> di
 
 
 def _mesh(file: GlbFile, rig: Rig, motion: SourceMotion, baked: BakedSkin | None, notes: list[str]) -> dict[str, Any]:
-    """The surface in its source's vertex order, copies for texture seams behind it, with all its influences."""
+    """The surface in its source's vertex order, followed by copies for texture seams, with all influences."""
     surface = rig.surface
     origin, faces, uv = surface.split_at_seams()
     vertex = surface.weld[origin]
@@ -100,7 +100,7 @@ def _mesh(file: GlbFile, rig: Rig, motion: SourceMotion, baked: BakedSkin | None
         "NORMAL": file.add(normals, "VEC3", target=ARRAY_BUFFER),
     }
     if uv is not None:
-        # glTF counts v downwards from the top of the picture
+        # v runs downwards from the top of the image in glTF
         flipped = np.asarray(uv, np.float32) * [1, -1] + [0, 1]
         attributes["TEXCOORD_0"] = file.add(flipped.astype("<f4"), "VEC2", target=ARRAY_BUFFER)
     influences = joint_weights(rig, motion, notes) if baked is None else (baked.joints, baked.weights)
@@ -120,6 +120,6 @@ def _mesh(file: GlbFile, rig: Rig, motion: SourceMotion, baked: BakedSkin | None
     if baked is not None and baked.names:
         moved = baked.shapes.astype("<f4")[:, vertex]
         primitive["targets"] = [{"POSITION": file.add(m, "VEC3", target=ARRAY_BUFFER, bounds=True)} for m in moved]
-        # the place where programs look for the targets' names
+        # not in the glTF standard, but where programs look for the targets' names
         mesh |= {"weights": baked.at_rest.tolist(), "extras": {"targetNames": list(baked.names)}}
     return mesh

@@ -1,4 +1,4 @@
-"""The glTF file that a rig was read from, opened again to have a motion added."""
+"""The glTF document that a rig was read from, opened again to add a motion."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _MEDIA = {
     ".webp": "image/webp",
     ".ktx2": "image/ktx2",
 }
-_SAME = 1e-6  # of the largest number: transforms of the joints that were loaded
+_SAME = 1e-6  # tolerance of joint transforms against those loaded, per largest number
 
 
 def own_document(
     rig: Rig, motion: SourceMotion, notes: list[str], warnings: list[str]
 ) -> tuple[GlbFile, NodeTree] | None:
-    """The rig's own file and its nodes; None for a rig whose joints are not a glTF file's."""
+    """The rig's own document and its nodes; None if the rig's joints are not those of a glTF file."""
     if rig.path is None or rig.path.suffix.lower() not in (".glb", ".gltf"):
         return None
     from warpjld.io.gltf.document import open_document
@@ -69,7 +69,7 @@ def _nodes(document: Document, joints: list[int], content: dict[str, Any], motio
     scales = rest_scales(rest)
     for n, number in enumerate(numbers):
         record = content["nodes"][number]
-        if "matrix" not in record:  # as it stands, signs included
+        if "matrix" not in record:  # scale as stated, with its signs
             scales[n] = record.get("scale", (1.0, 1.0, 1.0))
     return NodeTree(
         records=content["nodes"],
@@ -84,7 +84,7 @@ def _nodes(document: Document, joints: list[int], content: dict[str, Any], motio
 
 
 def _take_in_pictures(file: GlbFile, folder: Path, warnings: list[str]) -> None:
-    """Pictures beside a .gltf file become part of the binary content."""
+    """Embed images of a .gltf file in the binary content."""
     for picture in file.content.get("images", ()):
         uri = picture.get("uri")
         if uri is None or uri.startswith("data:"):

@@ -1,4 +1,4 @@
-"""World transforms of nodes → translation, rotation and scale below each one's parent, as glTF and USD want them."""
+"""Decomposition of world transforms into translation, rotation and scale relative to parents, for glTF and USD."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from scipy.spatial.transform import Rotation
 
 __all__ = ["LocalMotion", "local_motion", "rest_scales"]
 
-_FLAT = 1e-9  # of the largest: scale at which a direction is lost
-_SQUARE = 1e-6  # deviation from a rotation that needs no mending
+_FLAT = 1e-9  # smallest scale relative to the largest; below, the transform counts as singular
+_SQUARE = 1e-6  # largest deviation from a rotation that is not corrected
 
 
 @dataclass(frozen=True, eq=False)
 class LocalMotion:
-    """f frames of N nodes; scale is that of ``rest_scales`` in all of them.
+    """f frames of N nodes; their scale is constant, that of ``rest_scales``.
 
     Attributes:
         translations: Shape (f, N, 3).
         rotations: Unit quaternions x, y, z, w of any sign, shape (f, N, 4).
-        sheared: Largest part of a node's transform that these cannot hold, relative to its scale, shape (N,).
+        sheared: Largest part of each node's transform that these cannot represent, relative to its scale, shape (N,).
     """
 
     translations: NDArray[np.float64]
@@ -30,7 +30,7 @@ class LocalMotion:
 
 
 def rest_scales(local: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Scale of node-to-parent transforms (N, 4, 4), shape (N, 3); of a mirrored one the first is negative."""
+    """Scale of node-to-parent transforms (N, 4, 4), shape (N, 3); the first is negative for mirroring ones."""
     linear = local[:, :3, :3]
     scales = np.linalg.norm(linear, axis=1)
     scales[np.linalg.det(linear) < 0.0, 0] *= -1.0
@@ -44,17 +44,17 @@ def local_motion(
     scales: NDArray[np.float64],
     given: NDArray[np.bool_],
 ) -> LocalMotion:
-    """Split transforms relative to the parent.
+    """Decompose transforms relative to the parent.
 
-    A node is placed below what was written for its parent, so that where a transform is sheared, by a turn below a
-    parent scaled by different factors, all nodes are in their places yet.
+    A node is placed relative to the decomposed transform of its parent, so that positions are exact even where shear is
+    lost (rotation below a parent with non-uniform scale).
 
     Args:
-        worlds: Node-to-world transforms, shape (f, N, 4, 4); ignored for nodes that are not given.
+        worlds: Node-to-world transforms, shape (f, N, 4, 4); ignored for nodes that are not ``given``.
         parents: Parent of every node, -1 for none; in any order, shape (N,).
         rest: Node-to-parent transforms at rest, shape (N, 4, 4).
         scales: Scale in ``rest``, shape (N, 3); where one is 0 the rotation stays as at rest.
-        given: Nodes that ``worlds`` moves, shape (N,); the others keep their rest below their parent.
+        given: Mask of nodes that ``worlds`` moves, shape (N,); others stay at rest relative to their parent.
     """
     frames, count = worlds.shape[:2]
     shown = np.empty((frames, count, 4, 4))
@@ -84,7 +84,7 @@ def local_motion(
 
 
 def nearest_rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rotations nearest to matrices, shape (f, 3, 3)."""
+    """The nearest rotations to matrices, shape (f, 3, 3) (polar decomposition)."""
     off = np.abs(matrices @ matrices.swapaxes(-1, -2) - np.eye(3)).max()
     if off < _SQUARE and (np.linalg.det(matrices) > 0.0).all():
         return matrices

@@ -1,4 +1,4 @@
-"""Poses of a rig's hand → MANO's parameters."""
+"""Writer of MANO parameters of a rig's hands."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ __all__ = ["hand_parameters", "write_mano"]
 
 
 def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-    """Write a hand's motion as MANO-family parameters; a :class:`~warpjld.motion.out.write.Writer`.
+    """Write a hand's motion as MANO-family parameters; a :class:`~warpjld.motion.out.write.MotionWriter`.
 
-    Fields: ``global_orient`` (F, 3) and ``hand_pose`` (F, 45), axis-angle [rad]; ``transl`` (F, 3), where the wrist is
-    [m]; ``joint_order`` (15 names), ``side``, ``fps``, ``flat_hand_mean`` (true: no rotation is the flat hand) and
-    ``frame``, "rig": orientation and place are in the rig's own axes. Of a rig with two hands the first three have
-    ``left_`` and ``right_`` before them, and ``side`` is not there. MANO's ``transl`` adds to the place of its wrist in
-    its template, which is the licensed model's: subtract it. Joints that the rig lacks do not turn.
+    Fields: ``global_orient`` (F, 3) and ``hand_pose`` (F, 45), axis-angle [rad]; ``transl`` (F, 3), the wrist's
+    position [m]; ``joint_order`` (15 names), ``side``, ``fps``, ``flat_hand_mean`` (true: zero rotations are the flat
+    hand) and ``frame``, "rig": orientation and position are in the rig's own axes. For a rig with two hands the first
+    three are prefixed with ``left_`` and ``right_``, and ``side`` is missing. MANO adds its ``transl`` to the wrist of
+    its template, which belongs to the licensed model: subtract that. Joints missing in the rig do not rotate.
 
     Raises:
         InputError: The rig has no hand.
@@ -54,8 +54,8 @@ def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMot
 def hand_parameters(skeleton: Skeleton, poses: Poses, side: str) -> dict[str, NDArray[np.float64]]:
     """``global_orient``, ``hand_pose`` and ``transl`` of one hand.
 
-    With Q the rotation of a bone relative to the wrist, W and A as in ``ManoTrack.turns``, the bone's rotation from the
-    flat hand is R = Wᵀ Q A⁻¹ W; MANO has no moving metacarpals, so that theirs is in the fingers'.
+    With Q the rotation of a bone relative to the wrist, and W and A as in ``ManoTrack.turns``, the bone's rotation from
+    the flat hand is R = Wᵀ Q A⁻¹ W. MANO has no mobile metacarpals: their rotations are included in the fingers'.
     """
     rest = mano_rest(skeleton, side)
     wrist = skeleton.index(f"{side}.wrist")

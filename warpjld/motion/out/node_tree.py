@@ -1,4 +1,4 @@
-"""The nodes of a glTF file that a motion concerns: its joints and all that they hang on."""
+"""The nodes of a glTF file that a motion affects: its joints and all their ancestors."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ __all__ = ["NodeTree"]
 
 @dataclass(frozen=True, eq=False)
 class NodeTree:
-    """n nodes, N of which are a motion's joints.
+    """n nodes, of which N are a motion's joints.
 
     Attributes:
         records: The nodes in the file's JSON.
-        numbers: Their numbers in the file, shape (n,).
-        parents: Parent of every node, numbered here, -1 for none, shape (n,).
+        numbers: Their indices in the file, shape (n,).
+        parents: Parent of every node, as an index into these nodes, -1 for none, shape (n,).
         rest: Node-to-parent transforms at rest, shape (n, 4, 4).
         rest_worlds: Node-to-world transforms at rest, shape (n, 4, 4).
         scales: Scale in ``rest``, shape (n, 3).
-        joints: Which node each joint is, shape (N,).
-        worlds: Gives joint-to-world transforms of a range of f frames, shape (f, N, 4, 4).
+        joints: Node of each joint, shape (N,).
+        worlds: Function from a range of f frames to joint-to-world transforms, shape (f, N, 4, 4).
     """
 
     records: list[dict[str, Any]]
@@ -41,18 +41,18 @@ class NodeTree:
 
     @property
     def size(self) -> float:
-        """Diagonal of the box around the joints at rest, in the file's units."""
+        """Diagonal of the joints' bounding box at rest, in the file's units."""
         return float(np.linalg.norm(np.ptp(self.rest_worlds[self.joints, :3, 3], axis=0))) or 1.0
 
     @property
     def reach(self) -> NDArray[np.float64]:
-        """How far a unit of a joint's translation goes in the world, shape (N,)."""
+        """World length of a unit of each joint's translation, shape (N,)."""
         above = self.parents[self.joints]
         lengths = np.linalg.norm(self.rest_worlds[above, :3, :3], axis=1).max(axis=-1)
         return np.where(above >= 0, lengths, 1.0)
 
     def under(self, moved: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Joints that are moved, or hang on one that is, shape (N,)."""
+        """Mask of joints that are moved or descend from a moved one, shape (N,)."""
         nodes = np.zeros(len(self.parents), dtype=bool)
         nodes[self.joints[moved]] = True
         for node in range(len(nodes)):
@@ -64,7 +64,7 @@ class NodeTree:
         return nodes[self.joints]
 
     def make_animatable(self, joint: int) -> None:
-        """Animated nodes must not have a matrix: write translation, rotation and scale in its place."""
+        """Replace a node's matrix by translation, rotation and scale, as glTF requires of animated nodes."""
         node = int(self.joints[joint])
         record, rest, scale = self.records[self.numbers[node]], self.rest[node], self.scales[node]
         if record.pop("matrix", None) is None:

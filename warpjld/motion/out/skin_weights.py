@@ -1,4 +1,4 @@
-"""Skin weights over a rig's own joints, for files whose readers move the surface themselves."""
+"""Skin weights over a rig's own joints, for formats whose readers do the skinning."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from warpjld.skeleton import Skeleton
 
 __all__ = ["joint_weights"]
 
-_SMALLEST = 1e-3  # weights below are left out
+_SMALLEST = 1e-3  # smallest weight that is written, per largest of the vertex
 
 
 def joint_weights(rig: Rig, motion: SourceMotion, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Joints of ``motion`` and their weights at every welded vertex, strongest first, shapes (V, 4 k).
 
-    Painted weights where the rig has them; else those of the geometry's domains, which a note tells.
+    Painted weights if the rig has them; else weights of the geometry's domains, with a note.
     """
     skin = rig.skin
     if skin is None:
@@ -46,7 +46,7 @@ def joint_weights(rig: Rig, motion: SourceMotion, notes: list[str]) -> tuple[NDA
 
 
 def _sources(rig: Rig, motion: SourceMotion) -> NDArray[np.int64]:
-    """Joint of the file whose motion each joint of the skeleton has: its own, or for added ones the next above."""
+    """Joint of the file that each joint of the skeleton moves with: its own; for added ones that of an ancestor."""
     if rig.source is None:
         return np.arange(len(rig.skeleton))
     out = np.array(rig.sources)
@@ -57,7 +57,8 @@ def _sources(rig: Rig, motion: SourceMotion) -> NDArray[np.int64]:
 
 
 def _bound(rig: Rig) -> Skin:
-    """The weight of every operator at a vertex, on the joints that carry its segments; nearer ones get more."""
+    """Weights from the covering's domains: each operator's weight is shared among the joints of its segments, by
+    distance from the vertex to the power of -4."""
     from warpjld.covering.domains import domains_from_geometry
     from warpjld.covering.operators import fans
 

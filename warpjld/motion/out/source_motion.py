@@ -1,13 +1,13 @@
-"""The motion of a rig's own joints: poses of the canonical skeleton → transforms in the file's units and axes.
+"""Motion of a rig's own joints: poses of the canonical skeleton as transforms in the file's units and axes.
 
 A joint of the skeleton moves its flesh by a rigid motion M(t), the rotation q(t) about its rest position x to its
-position p(t). A joint of the file moves with the joint of the skeleton that it is, or that it belongs to
+position p(t). A joint of the file moves with the joint of the skeleton that it corresponds to, or belongs to
 (``Rig.owner``): with B its rest transform, joint to world in the file, and S the similarity that loading applied
 (``Rig.placing``),
 
     A(t) = S⁻¹ M(t) S B,   M(t) y = q(t) (y − x) q(t)⁻¹ + p(t)
 
-so twist bones and helpers go rigidly with their segment, and what lies above all recognised joints stays. It is the
+so twist bones and helpers move rigidly with their segment, and joints above all recognised ones do not move. It is the
 inverse of :func:`warpjld.motion.own_joints.own_poses`.
 """
 
@@ -35,7 +35,7 @@ else:
 
 __all__ = ["SourceMotion", "source_motion"]
 
-_BLOCK = 512  # frames of transforms held at once: memory does not grow with the length of the clip
+_BLOCK = 512  # frames of transforms held at once, so that memory does not grow with the length of the clip
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +43,12 @@ class SourceMotion:
     """F frames of a rig's N own joints.
 
     Attributes:
-        tree: The joints, as the file has them: its names, units and axes.
-        owner: Joint of the skeleton that each moves with, -1 for those that stay, shape (N,).
+        tree: The joints in the file's names, units and axes.
+        owner: Joint of the skeleton that each joint moves with, -1 for those that do not move, shape (N,).
         placing: Similarity from the file's units and axes to metres with Y up, shape (4, 4).
         rest: Rest positions of the skeleton's joints [m], shape (J, 3).
         poses: Poses of the skeleton.
-        notes: What a reader of the result should know.
+        notes: Information for the user of the result.
     """
 
     tree: SourceTree
@@ -84,7 +84,7 @@ class SourceMotion:
         return out
 
     def moves(self, frames: slice = slice(None)) -> NDArray[np.float64]:
-        """The rigid motion M of every joint from rest in the rig's frame, shape (f, N, 4, 4)."""
+        """The rigid motion M of every joint from rest, in the rig's metres and axes, shape (f, N, 4, 4)."""
         turns = self.rotations(frames)
         out = np.zeros((*turns.shape[:2], 4, 4))
         out[..., :3, :3] = (
@@ -100,13 +100,13 @@ class SourceMotion:
         return np.asarray(np.linalg.inv(self.placing) @ self.moves(frames) @ self.placing @ self.tree.frames)
 
     def blocks(self, frames: int = _BLOCK) -> Iterator[slice]:
-        """Ranges of frames that cover the clip, for the methods above: a long clip is worked through in parts."""
+        """Ranges of frames that cover the clip, to process long clips in parts with the methods above."""
         for start in range(0, len(self), frames):
             yield slice(start, min(start + frames, len(self)))
 
 
 def source_motion(rig: Rig, poses: Poses) -> SourceMotion:
-    """The motion of a rig's own joints; of a rig made without a file, its skeleton's.
+    """The motion of a rig's own joints, or of its skeleton's for a rig without a file.
 
     Raises:
         InputError: No frames, poses of another skeleton, or poses that are not finite.

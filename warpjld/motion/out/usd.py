@@ -1,12 +1,12 @@
-"""Writing UsdSkel: a SkelRoot with the rig's own joints, a SkelAnimation of their motion, and the skinned surface.
+"""Writer of UsdSkel: a SkelRoot with the rig's own joints, a SkelAnimation of their motion, and the skinned surface.
 
-The stage has the units and axes of the rig's own file, so that it can be laid over it; ``metersPerUnit`` and ``upAxis``
-say which they are. A rig that was placed by more than a unit and an up axis is written in metres with Y up. A time code
-is a frame number.
+The stage has the units and axes of the rig's own file, so that the two can be overlaid; they are stated by
+``metersPerUnit`` and ``upAxis``. If loading placed the rig by more than a unit and an up axis, metres and Y up are
+used. A time code is a frame number.
 
-USD holds scales of joints as 16 bit floats. A scale that all joints have in common is the SkelRoot's, which is exact;
-of others, bind and rest transforms are made with the rounded ones, so that the skin follows exactly, and translations
-such that every joint is in its place.
+USD stores joint scales as 16-bit floats. A scale that is common to all joints is put on the SkelRoot, which is exact;
+otherwise bind and rest transforms are computed with the rounded scales, so that the skin follows exactly, and
+translations such that joint positions are exact.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from warpjld.skeleton import Poses
 
 __all__ = ["write_usd"]
 
-_SHEARED = 1e-3  # of a joint's scale
-_SAME = 1e-9  # of the file's unit
+_SHEARED = 1e-3  # smallest shear that is reported, per scale of the joint
+_SAME = 1e-9  # tolerance of the placing, per unit of the file
 
 
 def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSkin | None = None) -> WrittenMotion:
-    """Write a motion of a rig's own joints as USD; a :class:`~warpjld.motion.out.write.Writer`.
+    """Write a motion of a rig's own joints as USD; a :class:`~warpjld.motion.out.write.MotionWriter`.
 
     Args:
         path: The file.
-        rig: What moves.
+        rig: The rig.
         poses: Poses of its skeleton.
-        timing: When frames are.
-        baked: Skin weights in place of the rig's own, with blend shapes.
+        timing: Frame rate, first frame and name.
+        baked: Skin weights that replace the rig's own, with blend shapes.
 
     Raises:
         MissingExtraError: OpenUSD is not installed.
@@ -86,14 +86,14 @@ def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSk
 
 @dataclass(frozen=True, eq=False)
 class _Space:
-    """What the stage is written in, and its N joints, in an order that has parents first.
+    """Units and axes of the stage, and its N joints, parents first.
 
     Attributes:
-        metres: Metres a unit.
+        metres: Metres per unit.
         up: ``Y`` or ``Z``.
         scale: Scale of the SkelRoot.
         to_rig: Skeleton space → the rig's metres with Y up, shape (4, 4).
-        order: The joints' numbers in the rig's file, shape (N,).
+        order: Index of each joint in the rig's file, shape (N,).
         parents: Parent of every joint in this order, -1 for none, shape (N,).
         local: Joint-to-parent transforms at rest, shape (N, 4, 4).
         scales: Scale in ``local``, shape (N, 3).
@@ -138,7 +138,7 @@ def _space(motion: SourceMotion) -> _Space:
 
 
 def _rest(frames: NDArray[np.float64], parents: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Joint-to-parent transforms of joints at these places, with scales as USD holds them, and those scales."""
+    """Joint-to-parent transforms with scales rounded as USD stores them, and those scales."""
     local = frames.copy()
     hang = parents >= 0
     local[hang] = np.linalg.solve(frames[parents[hang]], frames[hang])
@@ -162,7 +162,7 @@ def _head(stage: Any, space: _Space, timing: Timing, frames: int) -> None:
 
 
 def _below(stage: Any, root: Any, name: str) -> Any:
-    """A free path below the root, called so as far as USD can."""
+    """An unused path below the root, from a name made a valid identifier."""
     from pxr import Tf
 
     chosen = Tf.MakeValidIdentifier(name)
@@ -187,7 +187,7 @@ def _skeleton(stage: Any, root: Any, motion: SourceMotion, space: _Space) -> Any
 
 
 def _tokens(names: list[str], parents: NDArray[np.int64]) -> list[str]:
-    """USD's names of joints, parents first: paths of identifiers, each different."""
+    """USD's joint tokens, parents first: unique paths of identifiers."""
     from pxr import Tf
 
     out: list[str] = []
@@ -201,7 +201,7 @@ def _tokens(names: list[str], parents: NDArray[np.int64]) -> list[str]:
 
 
 def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int) -> NDArray[np.float64]:
-    """Samples of all frames; what of each joint's turns its scales cannot hold, as ``LocalMotion.sheared``."""
+    """Write samples of all frames; returns the shear that is lost, as ``LocalMotion.sheared``."""
     from pxr import Vt
 
     translations, rotations = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()
@@ -215,7 +215,7 @@ def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int) ->
         local = local_motion(worlds, space.parents, space.local, space.scales, given)
         sheared = np.maximum(sheared, local.sheared)
         for frame, (move, turn) in enumerate(zip(local.translations, local.rotations, strict=True)):
-            # programs that interpolate the four numbers must take the short way
+            # consecutive quaternions on the same hemisphere, for programs that interpolate components
             last = np.where((turn * last).sum(axis=-1, keepdims=True) < 0.0, -turn, turn)
             time = start + block.start + frame
             translations.Set(Vt.Vec3fArray.FromNumpy(move.astype(np.float32)), time)
@@ -233,7 +233,7 @@ def _surface(
     baked: BakedSkin | None,
     notes: list[str],
 ) -> Any:
-    """The surface at rest in its source's vertex order, bound to the joints."""
+    """Write the surface at rest in its source's vertex order, bound to the joints."""
     from pxr import Gf, UsdGeom, UsdSkel, Vt
 
     surface = rig.surface
@@ -260,7 +260,7 @@ def _surface(
 
 
 def _blend_shapes(stage: Any, mesh: Any, animation: Any, rig: Rig, space: _Space, baked: BakedSkin, start: int) -> None:
-    """Shapes below the mesh, and their weights over time beside the joints'."""
+    """Write shapes below the mesh, and their weights over time in the animation."""
     from pxr import UsdSkel, Vt
 
     back = np.linalg.inv(space.to_rig)[:3, :3]

@@ -1,4 +1,4 @@
-"""Poses of a rig → a motion file; the suffix says which kind."""
+"""Writing of poses of a rig to a motion file; the suffix determines the format."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOTION_OUT = {
     ".usdc": "UsdSkel, binary",
     ".npz": "MANO-family parameters of the rig's hands, as NumPy arrays",
 }
-"""What each suffix is, for help texts."""
+"""Suffix → description, for help texts."""
 
 _WRITERS = {
     ".bvh": ("bvh", "write_bvh"),
@@ -34,16 +34,16 @@ _WRITERS = {
     ".usdc": ("usd", "write_usd"),
     ".npz": ("mano", "write_mano"),
 }
-"""Module in this package and function, a :class:`Writer`, of each suffix: libraries are imported when needed."""
+"""Suffix → module in this package and function, a :class:`MotionWriter`; imported when first used."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """When frames are, and what the clip is called.
+    """Frame rate and numbering, and name of the clip.
 
     Attributes:
         rate: Frames a second.
-        start_frame: Number of the first frame, where a format counts frames.
+        start_frame: Number of the first frame, for formats that number frames.
         name: Name of the clip inside the file.
     """
 
@@ -58,11 +58,11 @@ class Timing:
 
 @dataclass(frozen=True)
 class WrittenMotion:
-    """What was written.
+    """Messages about a written motion.
 
     Attributes:
-        notes: What whoever opens the file should know.
-        warnings: What of the motion the file does not hold: told on stderr by every command.
+        notes: Information for users of the file.
+        warnings: What of the motion the file does not hold; every command prints them on stderr.
     """
 
     notes: tuple[str, ...] = ()
@@ -70,14 +70,14 @@ class WrittenMotion:
 
 
 class MotionWriter(Protocol):
-    """Writes one kind of file to a place whose suffix is right but whose name is not the last."""
+    """Writer of one format, to a temporary path with the right suffix."""
 
     def __call__(self, path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
-        """Write all frames; OSError is told by the caller."""
+        """Write all frames; the caller converts OSError."""
 
 
 def check_motion_out(path: str | Path) -> None:
-    """Raise what ``write_motion`` would for a file's name: to be called before any long work.
+    """Raise what ``write_motion`` would raise for a file's name; to be called before long computations.
 
     Raises:
         InputError: Unknown suffix.
@@ -99,14 +99,14 @@ def write_motion(
 ) -> WrittenMotion:
     """Write a motion on the rig's own joints; see ``MOTION_OUT`` for the suffixes.
 
-    The file appears when it is complete, with its folder.
+    The file appears only when it is complete; its folder is created.
 
     Args:
         path: The file.
-        rig: What moves.
+        rig: The rig.
         poses: Poses of its skeleton.
         rate: Frames a second.
-        start_frame: Number of the first frame, where the format counts frames.
+        start_frame: Number of the first frame, for formats that number frames.
         name: Name of the clip inside the file; the file's stem by default.
 
     Raises:

@@ -1,7 +1,7 @@
-"""The 87 points of a body, proposed from its flesh alone.
+"""Proposal of a body's 87 points from its surface alone.
 
-Where the legs part, where the arms leave the trunk, where neck and wrists are narrowest is seen; joints between lie
-where bodies have them on average (Drillis, Contini 1966: shares of the height), in the middle of the flesh there.
+Crotch, armpits, narrowest section of the neck and wrists are measured; other joints are placed at average proportions
+(Drillis, Contini 1966: shares of the height), in the middle of the cross-section.
 """
 
 from __future__ import annotations
@@ -26,20 +26,21 @@ Points = dict[str, Array]
 
 _GRID = 170  # voxels in a body's height
 _HAND_GRID = 110  # voxels in a hand's length
-_CROTCH = (0.40, 0.55)  # heights between which legs part
-_USUAL_CROTCH = 0.47  # of the height, where none is found
-_HIP = 0.055  # of the height: the hip joint above where the legs part
-_ANKLE = 0.043  # of the height
-_KNEE = 0.5  # from ankle to hip
-_SPINE = (0.14, 0.28, 0.45, 0.72)  # vertebrae from pelvis to the lowest of the neck
-_SPINE_DEPTH, _SKULL_DEPTH = 0.42, 0.3  # of the flesh from the back; the mouth lies before the skull's base
-_NECK = (0.80, 0.92)  # where the narrowest place of the neck is looked for
-_ELBOW = 0.48  # from wrist to shoulder
+# heights and lengths below are shares of the body's height unless stated
+_CROTCH = (0.40, 0.55)  # range of heights that is searched for the crotch
+_USUAL_CROTCH = 0.47  # where none is found
+_HIP = 0.055  # hip joint above the crotch
+_ANKLE = 0.043
+_KNEE = 0.5  # share of the way from ankle to hip
+_SPINE = (0.14, 0.28, 0.45, 0.72)  # vertebrae: shares of the way from the pelvis to the lowest vertebra of the neck
+_SPINE_DEPTH, _SKULL_DEPTH = 0.42, 0.3  # share of the trunk's depth from the back; the mouth lies before the skull base
+_NECK = (0.80, 0.92)  # range of heights that is searched for the narrowest section of the neck
+_ELBOW = 0.48  # share of the way from wrist to shoulder
 _SHOULDER = 0.1  # head of the humerus from the midline
-_WIDER = 1.35  # an arm ends where it is that much wider than it is on average
-_REACH = 1.4  # of the way from fingertip to wrist: how much of an arm is looked at as a hand
-_BALL = 0.72  # of the foot's length from the heel
-_HEEL = 0.13  # of the foot's length from its back
+_ARM_WIDENING = 1.35  # an arm ends where its width exceeds its median width by this factor
+_REACH = 1.4  # part of an arm that is taken as its hand, per distance from fingertip to wrist
+_BALL = 0.72  # share of the foot's length from the heel
+_HEEL = 0.13  # share of the foot's length from its back end
 
 
 def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the body") -> Points:
@@ -48,19 +49,21 @@ def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the bo
     Args:
         vertices: Its surface in any unit and axes, shape (V, 3).
         faces: Its triangles, shape (T, 3).
-        label: What messages call it.
+        label: Name of the surface in messages.
 
     Returns:
         The 87 points in the surface's own unit and axes.
 
     Raises:
-        InputError: It is no upright body with legs, arms and fingers apart.
+        InputError: It is not an upright body with legs, arms and fingers apart.
     """
     solid = solid_of(vertices, faces, float(np.ptp(vertices, axis=0).max()) / _GRID).main_piece()
     stance = find_stance(solid, label)
-    solid = VoxelSolid(stance.inward(solid.points), solid.depth / stance.height, solid.size / stance.height, solid.ways)
-    # distances of the ways scale, too
-    solid.ways.data /= stance.height
+    solid = VoxelSolid(
+        stance.inward(solid.points), solid.depth / stance.height, solid.size / stance.height, solid.graph
+    )
+    # path lengths are in the solid's unit, too
+    solid.graph.data /= stance.height
     points: Points = {}
     legs = _legs(solid, points)
     _trunk(solid, points)
@@ -69,7 +72,7 @@ def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the bo
     for side, tip in zip(("left", "right"), _hands(solid, points, legs, label), strict=True):
         _arm(solid, surface, faces, side, tip, points, f"{label}, {side} hand")
     nearest = {name: solid.nearest(place) for name, place in points.items()}
-    for name, voxel in nearest.items():  # what a mean of hollow sections put outside comes back
+    for name, voxel in nearest.items():  # centres of concave sections may lie outside the solid
         if "." in name and name.split(".", 1)[1].partition(".")[0] in _DIGITS:
             continue
         if np.linalg.norm(solid.points[voxel] - points[name]) > 1.5 * solid.size:
@@ -84,18 +87,18 @@ def _slab(solid: VoxelSolid, height: float) -> NDArray[np.bool_]:
     return np.asarray(np.abs(solid.points[:, 1] - height) < 1.2 * solid.size)
 
 
-def _beside(solid: VoxelSolid, height: float, sign: float, place: float | None = None) -> NDArray[np.int64]:
+def _leg_section(solid: VoxelSolid, height: float, sign: float, place: float | None = None) -> NDArray[np.int64]:
     """Voxels of the leg on one side at a height."""
     found = [p for p in pieces(solid, _slab(solid, height)) if sign * solid.points[p, 0].mean() > 0 and len(p) > 8]
     if not found:
         return np.zeros(0, dtype=np.int64)
-    # of several, as where a hand hangs beside the leg, the one nearest to the middle
+    # of several pieces (a hand may hang beside the leg), the one nearest to ``place``
     large = [p for p in found if len(p) > 0.4 * len(found[0])]
     return min(large, key=lambda p: abs(float(solid.points[p, 0].mean()) - (place or 0.0)))
 
 
 def _crotch(solid: VoxelSolid) -> float:
-    """Where the legs part: the lowest height at which what carries the middle is one."""
+    """Height of the crotch: the lowest height at which one piece of the section spans the midline."""
     for height in np.arange(*_CROTCH, 1.5 * solid.size):
         for piece in pieces(solid, _slab(solid, float(height)))[:3]:
             x = solid.points[piece, 0]
@@ -105,19 +108,19 @@ def _crotch(solid: VoxelSolid) -> float:
 
 
 def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
-    """Hips to toes; which voxels are the legs'."""
+    """Place the joints from hips to toes; returns the mask of the legs' voxels."""
     crotch = _crotch(solid)
     high = crotch + _HIP
     legs = solid.points[:, 1] < crotch
     middle = solid.points[_slab(solid, high) & (np.abs(solid.points[:, 0]) < 0.12)].mean(axis=0)
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        thigh = solid.points[_beside(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
+        thigh = solid.points[_leg_section(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
         hip = np.array([thigh[0], high, (thigh[2] + middle[2]) / 2])
-        shin = [solid.points[_beside(solid, y, sign)].mean(axis=0) for y in (0.075, 0.14)]
+        shin = [solid.points[_leg_section(solid, y, sign)].mean(axis=0) for y in (0.075, 0.14)]
         ankle = shin[0] + (shin[0] - shin[1]) * (0.075 - _ANKLE) / 0.065
         knee_height = ankle[1] + _KNEE * (hip[1] - ankle[1])
         points[f"{side}.femoral_head"] = hip
-        points[f"{side}.knee"] = solid.points[_beside(solid, knee_height, sign)].mean(axis=0)
+        points[f"{side}.knee"] = solid.points[_leg_section(solid, knee_height, sign)].mean(axis=0)
         points[f"{side}.ankle"] = ankle
         _foot(solid, side, sign, points)
     hips = (points["left.femoral_head"] + points["right.femoral_head"]) / 2
@@ -159,7 +162,7 @@ def _trunk(solid: VoxelSolid, points: Points) -> None:
     pelvis = points["pelvis"]
     heights = np.arange(*_NECK, 1.5 * solid.size)
     widths = [float((_slab(solid, y) & (np.abs(solid.points[:, 0]) < 0.12)).sum()) for y in heights]
-    # slabs hold a varying number of layers
+    # slabs contain a varying number of voxel layers: count per layer
     widths = [
         w / max(1, len(np.unique(np.round(solid.points[_slab(solid, y), 1] / solid.size))))
         for w, y in zip(widths, heights, strict=True)
@@ -204,7 +207,7 @@ def _head(solid: VoxelSolid, surface: Array, points: Points) -> None:
 
 
 def _hands(solid: VoxelSolid, points: Points, legs: NDArray[np.bool_], label: str) -> list[int]:
-    """The furthest voxels of both arms."""
+    """The furthest voxel of the left and of the right arm."""
     distance = solid.distances(solid.nearest(points["pelvis"]))
     ends = [b for b in find_branches(solid, distance, 0.12) if abs(solid.points[b.tip, 0]) > 0.06]
     feet = [(points[f"{side}.ball"]) for side in ("left", "right")]
@@ -227,8 +230,8 @@ def _arm(
     widths = np.sqrt(areas)
     at = (np.arange(len(widths)) + 0.5) * step
     usual = float(np.median(widths[(at > 0.26) & (at < 0.34)]))
-    wide = np.flatnonzero((at > 0.25) & (widths > _WIDER * usual))
-    # the arm's flesh ends at the armpit; its joint is as far aside as shoulders are
+    wide = np.flatnonzero((at > 0.25) & (widths > _ARM_WIDENING * usual))
+    # the arm's section widens at the armpit; the shoulder joint is at a fixed distance from the midline
     beside = np.flatnonzero((at > 0.25) & (np.abs(line[:, 0]) < _SHOULDER))
     ends = [float(at[found[0]]) for found in (wide, beside) if len(found)]
     end = float(np.mean(ends)) if ends else 0.39
@@ -236,21 +239,21 @@ def _arm(
     wrist = float(at[near][int(np.argmin(widths[near]))])
     place = dict(zip(("wrist", "elbow", "shoulder"), (wrist, wrist + _ELBOW * (end - wrist), end), strict=True))
     there = {name: np.stack([np.interp(s, at, line[:, k]) for k in range(3)]) for name, s in place.items()}
-    hand = place_hand(*_fine(solid, surface, faces, line, from_tip, wrist), label)
+    hand = place_hand(*_fine_hand(solid, surface, faces, line, from_tip, wrist), label)
     points |= {f"{side}.{name}": point for name, point in hand.items()}
     points[f"{side}.elbow"], points[f"{side}.shoulder"] = there["elbow"], there["shoulder"]
     middle = (place["wrist"] + place["elbow"]) / 2
     points[f"{side}.forearm_twist"] = np.stack([np.interp(middle, at, line[:, k]) for k in range(3)])
 
 
-def _fine(
+def _fine_hand(
     solid: VoxelSolid, surface: Array, faces: NDArray[np.integer], line: Array, from_tip: Array, wrist: float
 ) -> tuple[VoxelSolid, Array]:
-    """A hand with a piece of forearm in finer voxels, and a point at its arm's end."""
+    """A hand with part of the forearm as a solid of finer voxels, and a point at the forearm's end."""
     own = solid.points[from_tip < _REACH * wrist]
     low, high = own.min(axis=0) - 2.0 * solid.size, own.max(axis=0) + 2.0 * solid.size
     fine = solid_of(surface, faces, wrist / _HAND_GRID, low=low, high=high, within=solid)
-    # of what else lies in the box, as the rest of the arm or a thigh, nothing is looked at
+    # other parts in the box, as the rest of the arm or a thigh, are left out
     _, nearest = cKDTree(solid.points).query(fine.points)
     fine = fine.part(from_tip[nearest] < _REACH * wrist).main_piece()
     step = 2.0 * solid.size

@@ -1,4 +1,4 @@
-"""Extremities of a solid: where the way from its middle ends, and where each branch leaves the others."""
+"""Branches of a voxel solid (limbs, digits) by persistence of the geodesic distance, and their centre lines."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ __all__ = ["Branch", "centre_line", "find_branches", "point_at"]
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A part of a solid that is one piece beyond some distance from where distances start.
+    """A part of a solid that is connected beyond some geodesic distance from the start.
 
     Attributes:
         tip: Its furthest voxel.
-        parting: Distance at which it joins a branch that reaches further; 0 for the furthest of all.
-        voxels: Those that are its own, furthest first.
+        parting: Distance at which it joins a longer branch; 0 for the longest.
+        voxels: Its own voxels, furthest first.
         length: From the parting to the tip.
     """
 
@@ -30,45 +30,45 @@ class Branch:
 
 
 def find_branches(solid: VoxelSolid, distance: NDArray[np.float64], least: float) -> list[Branch]:
-    """Branches at least so long, the longest first: peaks of the distance by their persistence.
+    """Branches of at least the length ``least``, the longest first: peaks of the distance by their persistence.
 
-    Voxels are added from the furthest inwards; a piece begins at a peak, and ends where it meets one with a higher
+    Voxels are added from the furthest inwards; a piece is born at a peak and ends where it meets a piece with a higher
     peak (Edelsbrunner, Letscher, Zomorodian 2002).
     """
     known = np.flatnonzero(np.isfinite(distance))
     order = known[np.argsort(-distance[known], kind="stable")]
-    ways = (solid.ways + solid.ways.T).tocsr()
-    starts, ends = ways.indptr, ways.indices
+    graph = (solid.graph + solid.graph.T).tocsr()
+    starts, ends = graph.indptr, graph.indices
     owner = np.full(len(distance), -1)
-    above: list[int] = []
+    union_parent: list[int] = []
     peaks: list[int] = []
     own: list[list[int]] = []
     found: list[Branch] = []
 
-    def top(piece: int) -> int:
-        while above[piece] != piece:
-            above[piece] = above[above[piece]]
-            piece = above[piece]
+    def find_root(piece: int) -> int:
+        while union_parent[piece] != piece:
+            union_parent[piece] = union_parent[union_parent[piece]]
+            piece = union_parent[piece]
         return piece
 
     for voxel in order.tolist():
-        pieces = {top(p) for p in owner[ends[starts[voxel] : starts[voxel + 1]]].tolist() if p >= 0}
+        pieces = {find_root(p) for p in owner[ends[starts[voxel] : starts[voxel + 1]]].tolist() if p >= 0}
         if not pieces:
-            above.append(len(above))
+            union_parent.append(len(union_parent))
             peaks.append(voxel)
             own.append([])
-            pieces = {above[-1]}
+            pieces = {union_parent[-1]}
         first = max(pieces, key=lambda p: distance[peaks[p]])
         for piece in pieces - {first}:
             length = float(distance[peaks[piece]] - distance[voxel])
             if length >= least:
                 found.append(Branch(peaks[piece], float(distance[voxel]), np.array(own[piece]), length))
-            above[piece] = first
+            union_parent[piece] = first
             own[first].extend(own[piece] if length < least else ())
         owner[voxel] = first
         own[first].append(voxel)
     if peaks:
-        first = top(0)
+        first = find_root(0)
         far = float(distance[peaks[first]])
         found.append(Branch(peaks[first], 0.0, np.array(own[first]), far))
     return sorted(found, key=lambda branch: -branch.length)
@@ -77,11 +77,11 @@ def find_branches(solid: VoxelSolid, distance: NDArray[np.float64], least: float
 def centre_line(
     solid: VoxelSolid, voxels: NDArray[np.int64], from_tip: NDArray[np.float64], step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres and cross-section areas of the slices of some voxels by their distance from a tip.
+    """Centres and cross-section areas of slices of a part of a solid, cut by distance from a tip.
 
     Args:
         solid: The solid.
-        voxels: Its voxels that are looked at.
+        voxels: Indices of the voxels to slice.
         from_tip: Distance of every voxel of the solid from the tip.
         step: Thickness of a slice.
 
@@ -96,7 +96,7 @@ def centre_line(
 
 
 def point_at(line: NDArray[np.float64], length: float) -> NDArray[np.float64]:
-    """The point of a polyline so far from its start; beyond its ends it goes on straight on."""
+    """The point of a polyline at arc length ``length`` from its start; extrapolated in a straight line past its end."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     if length > along[-1]:

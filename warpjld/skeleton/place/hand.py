@@ -1,4 +1,4 @@
-"""The 25 points of a hand, proposed from its flesh alone: fingertips, webs and wrist tell, proportions do the rest."""
+"""Proposal of a hand's 25 points from its surface alone: from fingertips, webs, wrist and average proportions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["place_hand"]
 Array = NDArray[np.float64]
 
 _FINGERS = ("index", "middle", "ring", "pinky")
-# mean lengths [mm] of proximal, middle and distal phalanx with the pad beyond (Buryanov, Kotiuk 2010)
+# mean lengths [mm] of proximal, middle and distal phalanx, the last with the pad (Buryanov, Kotiuk 2010)
 _PHALANGES = {
     "index": (39.8, 22.4, 19.7),
     "middle": (44.6, 26.3, 21.4),
@@ -25,14 +25,14 @@ _PHALANGES = {
     "pinky": (32.7, 18.1, 19.7),
 }
 _THUMB = (46.2, 31.6, 25.6)
-"""Metacarpal, proximal and distal phalanx with the pad [mm], likewise."""
-_WEB = 0.5  # of the proximal phalanx lies between the knuckle and the web
-_TO_WEB = 1.37  # wrist to web per free length of the middle finger: a palm is .57, a finger .42 of a hand's length
-_WRIST = (1.15, 1.7)  # where, in free lengths before the web, a wrist is looked for
-_CARPAL = 0.36  # of the way from the wrist to a finger's base
-_CMC = (0.27, 0.22)  # of the way from wrist to web: first carpometacarpal joint, forward and to the thumb's side
-_LEAST = 0.12  # of the longest way: a branch as long is a digit
-_THICK = 2.0  # flesh at an arm's end per flesh at the end of the thickest digit
+"""Metacarpal, proximal and distal phalanx with the pad [mm] (same source)."""
+_WEB = 0.5  # share of the proximal phalanx between knuckle and web
+_TO_WEB = 1.37  # wrist to web, per free length of the middle finger: a palm is .57, a finger .42 of a hand's length
+_WRIST = (1.15, 1.7)  # range before the web that is searched for the wrist, in free lengths
+_CARPAL = 0.36  # share of the way from the wrist to a finger's base
+_CMC = (0.27, 0.22)  # first carpometacarpal joint: shares of wrist to web, forward and to the thumb's side
+_LEAST = 0.12  # shortest branch that counts as a digit, per longest distance
+_THICK = 2.0  # smallest ratio of the forearm end's volume to that of the thickest digit's end
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def place_hand(solid: VoxelSolid, arm: Array | None = None, label: str = "the ha
     """Propose a hand's points.
 
     Args:
-        solid: A hand, maybe with a piece of forearm, one piece.
-        arm: A point at its arm's end; found where it is None.
-        label: What messages call it.
+        solid: A hand, possibly with part of the forearm, connected.
+        arm: A point at the forearm's end; found if None.
+        label: Name of the surface in messages.
 
     Returns:
         The 25 points, names without the side [the solid's unit], each shape (3,).
@@ -63,14 +63,13 @@ def place_hand(solid: VoxelSolid, arm: Array | None = None, label: str = "the ha
     digits = find_branches(solid, distance, _LEAST * float(distance[np.isfinite(distance)].max()))[:5]
     if len(digits) < 5:
         raise InputError(
-            f"{label}: {len(digits)} digits stand apart from one another, five are wanted: "
-            "spread the fingers of the digitised hand"
+            f"{label}: found {len(digits)} separate digits, expected five: spread the fingers of the digitised hand"
         )
     furthest = max(digits, key=lambda b: float(distance[b.tip]))
     first_web = max(b.parting for b in digits if b is not furthest)
-    followed = [_follow(solid, distance, b, first_web if b is furthest else b.parting) for b in digits]
-    thumb = followed[_thumb_of(followed)]
-    fingers = [d for d in followed if d is not thumb]
+    traced = [_trace(solid, distance, b, first_web if b is furthest else b.parting) for b in digits]
+    thumb = traced[_thumb_of(traced)]
+    fingers = [d for d in traced if d is not thumb]
     web = float(np.median([float(distance[d.branch.tip]) - d.length for d in fingers]))
     free = float(np.median([d.length for d in fingers]))
     wrist, wrist_at = _wrist(solid, distance, web, free)
@@ -92,17 +91,17 @@ def place_hand(solid: VoxelSolid, arm: Array | None = None, label: str = "the ha
 
 
 def _thumb_of(digits: list[_Digit]) -> int:
-    """Which of five digits is the thumb: it begins away from the others, and points another way."""
+    """Index of the thumb among five digits: its base is apart from the others and it points another way."""
     bases = np.array([d.line[-1] for d in digits])
-    ways = np.array([unit(d.line[0] - d.line[-1]) for d in digits])
+    directions = np.array([unit(d.line[0] - d.line[-1]) for d in digits])
     apart = np.linalg.norm(bases[:, None] - bases[None], axis=2)
     apart = (apart + np.diag(np.full(len(digits), np.inf))).min(axis=1)
-    astray = [1.0 - float(unit(ways.sum(axis=0) - way) @ way) for way in ways]
-    return int(np.argmax(apart / np.median(apart) + 2.0 * np.array(astray)))
+    deviations = [1.0 - float(unit(directions.sum(axis=0) - way) @ way) for way in directions]
+    return int(np.argmax(apart / np.median(apart) + 2.0 * np.array(deviations)))
 
 
 def _arm_end(solid: VoxelSolid, label: str) -> Array:
-    """The middle of the thick one of a hand's six ends."""
+    """Centre of the forearm's end: the thickest of a hand's six ends."""
     start = solid.nearest(solid.points.mean(axis=0))
     distance = solid.distances(start)
     reach = float(distance[np.isfinite(distance)].max())
@@ -111,18 +110,18 @@ def _arm_end(solid: VoxelSolid, label: str) -> Array:
     thick = [len(voxels) for voxels in outer]
     if len(ends) < 6:
         raise InputError(
-            f"{label}: {len(ends)} ends stand out, five digits and an arm are wanted: "
+            f"{label}: found {len(ends)} extremities, expected five digits and an arm: "
             "spread the fingers of the digitised hand"
         )
     ranked = np.argsort(thick)
     if thick[ranked[-1]] < _THICK * thick[ranked[-2]]:
-        raise InputError(f"{label}: no end is clearly thicker than the others, as a wrist is beside fingers")
+        raise InputError(f"{label}: no extremity is clearly thicker than the others, as a forearm should be")
     return np.asarray(solid.points[outer[int(ranked[-1])]].mean(axis=0))
 
 
-def _follow(solid: VoxelSolid, distance: Array, branch: Branch, web: float) -> _Digit:
+def _trace(solid: VoxelSolid, distance: Array, branch: Branch, web: float) -> _Digit:
     own = branch.voxels[distance[branch.voxels] >= web]
-    # from the tip through the digit alone
+    # distances from the tip within the digit alone
     mine = np.zeros(len(solid.points), dtype=bool)
     mine[own] = True
     piece = solid.part(mine)
@@ -132,38 +131,38 @@ def _follow(solid: VoxelSolid, distance: Array, branch: Branch, web: float) -> _
     own = own[np.isfinite(from_tip[own])]
     line, _ = centre_line(solid, own, from_tip, 2.0 * solid.size)
     length = float(distance[branch.tip]) - web
-    keep = max(3, int(0.8 * len(line)))  # the last slices lean towards the neighbour: the digit goes on straight
+    keep = max(3, int(0.8 * len(line)))  # the last slices lean towards the neighbour: extrapolate straight instead
     line = np.vstack([solid.points[branch.tip], line[1:keep]])
-    line = np.vstack([line, point_at(line, max(length, 1.02 * _long(line)))])
+    line = np.vstack([line, point_at(line, max(length, 1.02 * _arc_length(line)))])
     return _Digit(branch, line, length)
 
 
-def _long(line: Array) -> float:
+def _arc_length(line: Array) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _wrist(solid: VoxelSolid, distance: Array, web: float, free: float) -> tuple[Array, float]:
-    """The narrowest place between hand and forearm, where one is near where wrists are; and its distance."""
+    """The narrowest section between hand and forearm near the expected wrist; its centre and distance."""
     expected = web - _TO_WEB * free
     near = np.flatnonzero(np.isfinite(distance) & (distance < web))
     centres, areas = centre_line(solid, near, distance, 2.0 * solid.size)
     at = (np.arange(len(areas)) + 0.5) * 2.0 * solid.size
-    # slices are round about where distances start: no width is known as near to the end as half of it
+    # slices near the start are spherical: widths are meaningless within half a width of it
     known = 0.5 * float(np.sqrt(np.median(areas)))
     low, high = max(web - _WRIST[1] * free, known), web - _WRIST[0] * free
     window = np.flatnonzero((at >= low) & (at <= high))
-    if expected < known or not len(window):  # cut off at the wrist
+    if expected < known or not len(window):  # the surface ends at the wrist
         k = int(np.abs(at - max(expected, 2.0 * solid.size)).argmin())
         return centres[k], float(at[k])
     width = np.sqrt(areas[window] / areas[window].min())
-    # a tenth of the width counts as much as half a free length away from where wrists usually are
+    # a deviation by half a free length from the expected place costs a tenth of the width
     k = window[int((width + 0.1 * ((at[window] - expected) / (0.5 * free)) ** 2).argmin())]
     return centres[k], float(at[k])
 
 
 def _finger(solid: VoxelSolid, name: str, digit: _Digit, wrist: Array, palm: float, normal: Array) -> dict[str, Array]:
     first, second, third = _PHALANGES[name]
-    # the palm tells how far behind the web a knuckle lies, the finger's own free length how long its bones are
+    # knuckle behind the web: mean of the scales that the palm and the finger's free length give
     behind = 0.5 * _WEB * first * (palm / 117.0 + digit.length / (first + second + third - _WEB * first))
     web = digit.line[-1]
     own = unit(web - point_at(digit.line, 0.5 * digit.length))
@@ -198,7 +197,7 @@ def _thumb(
 
 
 def _tip(solid: VoxelSolid, line: Array, last: float) -> Array:
-    """The centre of the round end: as far from it as the flesh around is thick."""
+    """Centre of the rounded fingertip: its distance from the end is the local thickness of the flesh."""
     end = point_at(line, 0.35 * last)
     near = np.linalg.norm(solid.points - end, axis=1) < 0.35 * last
     radius = float(solid.depth[near].max()) if near.any() else 0.35 * last
@@ -211,12 +210,12 @@ def _inside(solid: VoxelSolid, place: Array) -> Array:
 
 
 def _middle(solid: VoxelSolid, place: Array, normal: Array) -> Array:
-    """The middle of the flesh above and below a place in the palm."""
+    """The middle of the flesh along the palm's normal through a place."""
     place = solid.points[solid.nearest(place)]
     away = solid.points - place
     high = away @ normal
     column = high[np.linalg.norm(away - np.outer(high, normal), axis=1) < 1.5 * solid.size]
-    # only what hangs together with the place: a thumb may lie before the palm
+    # only the connected part around the place: a thumb may lie in front of the palm
     column = np.sort(column)
     breaks = np.flatnonzero(np.diff(column) > 3.0 * solid.size)
     below = column[: int(np.searchsorted(column, 0.0))]

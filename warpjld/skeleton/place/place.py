@@ -1,4 +1,4 @@
-"""Points proposed in any surface: a body's 87 or a hand's 25, all of them inside."""
+"""Proposal of named points in any surface, a body's 87 or a hand's 25, all of them inside it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ __all__ = ["propose_points"]
 Array = NDArray[np.float64]
 
 _GRID = 170  # voxels in a hand's diagonal
-_SURE = 0.15  # chirality from which a hand's side is told
-_CLOSEST = 4000  # voxels that are tried for a point outside
+_CLEAR = 0.15  # smallest absolute chirality that decides a hand's side
+_CANDIDATES = 4000  # nearest voxels tried for a point that lies outside
 
 
 def propose_points(
@@ -29,14 +29,14 @@ def propose_points(
     Args:
         vertices: Surface in any unit and axes, shape (V, 3); a body stands upright along an axis.
         faces: Its triangles, shape (T, 3).
-        side: ``left`` or ``right``: the surface is that hand. Else a body is looked for, then a hand.
-        label: What messages call it.
+        side: ``left`` or ``right`` if the surface is that hand; otherwise a body is tried first, then a hand.
+        label: Name of the surface in messages.
 
     Returns:
         87 points of a body or 25 of a hand by name [the surface's unit and axes], each shape (3,).
 
     Raises:
-        InputError: It is neither, or does not show what it takes: legs, arms and fingers apart from one another.
+        InputError: It is neither, or its legs, arms or fingers are not apart from one another.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -49,7 +49,7 @@ def propose_points(
     number[used] = np.arange(len(used))
     vertices, faces = np.asarray(vertices, dtype=np.float64)[used], number[faces]
     if not len(faces) or not np.ptp(vertices, axis=0).max() > 0.0:
-        raise InputError(f"{label}: encloses nothing")
+        raise InputError(f"{label}: has no triangles, or no extent")
     if side is not None:
         return _hand(vertices, faces, side, label)
     try:
@@ -67,14 +67,14 @@ def _hand(vertices: Array, faces: NDArray[np.integer], side: str | None, label: 
     solid = solid_of(vertices, faces, size).main_piece()
     points = place_hand(solid, label=label)
     turn = chirality(points)
-    if side is None and abs(turn) < _SURE:
-        raise InputError(f"{label}: neither fingers nor thumb tell whether it is a left or a right hand: give --side")
+    if side is None and abs(turn) < _CLEAR:
+        raise InputError(f"{label}: cannot tell by fingers and thumb whether it is a left or a right hand: give --side")
     side = side or ("right" if turn > 0 else "left")
-    points = {f"{side}.{name}": points[name] for name in _order(points)}
+    points = {f"{side}.{name}": points[name] for name in _in_canonical_order(points)}
     return _moved_inside(points, vertices, faces, solid)
 
 
-def _order(points: dict[str, Array]) -> list[str]:
+def _in_canonical_order(points: dict[str, Array]) -> list[str]:
     from warpjld.skeleton.hand import HAND_PARENTS
 
     return [name for name in HAND_PARENTS if name in points]
@@ -83,7 +83,7 @@ def _order(points: dict[str, Array]) -> list[str]:
 def _moved_inside(
     points: dict[str, Array], vertices: Array, faces: NDArray[np.integer], solid: VoxelSolid | None
 ) -> dict[str, Array]:
-    """Points in a hollow of the surface, as a mouth, at the nearest place in the flesh."""
+    """Move points that lie outside the surface (in a cavity such as a mouth) to the nearest place in the flesh."""
     names = list(points)
     out = np.flatnonzero(outside_surface(vertices, faces, np.array(list(points.values()))))
     if not len(out):
@@ -92,7 +92,7 @@ def _moved_inside(
         solid = solid_of(vertices, faces, float(np.ptp(vertices, axis=0).max()) / _GRID)
     for j in out:
         away = np.linalg.norm(solid.points - points[names[j]], axis=1)
-        near = np.argsort(away)[:_CLOSEST:8]
+        near = np.argsort(away)[:_CANDIDATES:8]
         inside = near[~outside_surface(vertices, faces, solid.points[near])]
         if len(inside):
             points[names[j]] = solid.points[inside[0]]

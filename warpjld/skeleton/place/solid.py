@@ -1,4 +1,4 @@
-"""A surface as a solid of voxels, whatever it is made of: open at a wrist, of pieces that overlap, of any topology."""
+"""Voxel solid of any triangle soup: open at a wrist, of overlapping pieces, of any topology."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ from scipy.spatial import cKDTree
 
 __all__ = ["VoxelSolid", "capped", "solid_of"]
 
-_FINE = 0.3  # of a voxel: nowhere are samples of the surface further apart, so that it has no gap
-_MOST_INSIDE = 200_000  # voxels of a solid
-_MOST = 6_000_000  # voxels of a grid
+_SAMPLE_SPACING = 0.3  # largest spacing of surface samples, per voxel: the voxelised surface has no gaps
+_MAX_VOXELS = 200_000  # largest number of voxels of a solid
+_MAX_CELLS = 6_000_000  # largest number of voxels of a grid
 _STEPS = [s for s in np.ndindex(3, 3, 3) if s > (1, 1, 1)]  # half of the 26 neighbours
 
 
 @dataclass(frozen=True, eq=False)
 class VoxelSolid:
-    """The N voxels inside a surface and the ways between them.
+    """The N voxels inside a surface and the graph of their 26-neighbourhoods.
 
     Attributes:
-        points: Their centres, shape (N, 3).
-        depth: Distance of each to the outside, shape (N,).
+        points: Voxel centres, shape (N, 3).
+        depth: Distance of each centre to the outside, shape (N,).
         size: Edge length of a voxel.
-        ways: Lengths of the steps between neighbours, sparse, shape (N, N), one of both directions.
+        graph: Steps between neighbours with their lengths, sparse, shape (N, N), each pair stored once.
     """
 
     points: NDArray[np.float64]
     depth: NDArray[np.float64]
     size: float
-    ways: coo_matrix
+    graph: coo_matrix
 
     def distances(self, start: NDArray[np.integer] | int) -> NDArray[np.float64]:
-        """Length of the shortest way inside the solid from the nearest of some voxels, ``inf`` where none is."""
-        return np.asarray(dijkstra(self.ways, directed=False, indices=np.atleast_1d(start), min_only=True))
+        """Length of the shortest path inside the solid from the nearest start voxel; ``inf`` if unconnected."""
+        return np.asarray(dijkstra(self.graph, directed=False, indices=np.atleast_1d(start), min_only=True))
 
     def nearest(self, place: NDArray[np.float64]) -> int:
-        """The voxel nearest to a place."""
+        """Index of the voxel nearest to a place."""
         return int(((self.points - place) ** 2).sum(axis=1).argmin())
 
     def part(self, chosen: NDArray[np.bool_]) -> VoxelSolid:
-        """The solid of some of the voxels."""
-        ways = self.ways.tocsr()[chosen][:, chosen].tocoo()
-        return VoxelSolid(self.points[chosen], self.depth[chosen], self.size, ways)
+        """The solid of the chosen voxels."""
+        graph = self.graph.tocsr()[chosen][:, chosen].tocoo()
+        return VoxelSolid(self.points[chosen], self.depth[chosen], self.size, graph)
 
     def main_piece(self) -> VoxelSolid:
         """The largest connected piece."""
-        _, label = connected_components(self.ways, directed=False)
+        _, label = connected_components(self.graph, directed=False)
         return self.part(label == np.bincount(label).argmax())
 
 
@@ -63,28 +63,28 @@ def solid_of(
     high: NDArray[np.float64] | None = None,
     within: VoxelSolid | None = None,
 ) -> VoxelSolid:
-    """Fill a surface: what cannot be reached from outside the voxels that it touches, less the outermost layer.
+    """Voxelise the inside of a surface: what a flood fill from outside does not reach, less the outermost layer.
 
-    Holes are capped first. Inner surfaces, as of pieces that overlap, part nothing.
+    Holes are capped first. Inner surfaces, as of overlapping pieces, do not divide the solid.
 
     Args:
         vertices: Surface, shape (V, 3).
         faces: Its triangles, shape (T, 3).
         size: Edge length of a voxel.
-        low: Lowest corner of the box to look at, shape (3,); all of the surface by default.
+        low: Lowest corner of the box to voxelise, shape (3,); the whole surface by default.
         high: Its highest corner.
         within: A coarser solid of the same surface, which tells inside from outside at the box's sides where the
-            surface goes on beyond it.
+            surface extends beyond it.
     """
     vertices, faces = capped(vertices, faces)
     if low is None or high is None:
         low, high = vertices.min(axis=0), vertices.max(axis=0)
     shape = np.ceil((high - low) / size).astype(int) + 6
-    size = float(size * max(1.0, np.prod(shape.astype(float)) / _MOST) ** (1 / 3))
+    size = float(size * max(1.0, np.prod(shape.astype(float)) / _MAX_CELLS) ** (1 / 3))
     shape = np.ceil((high - low) / size).astype(int) + 6
     origin = low - 2.5 * size
     whole = (origin - size, origin + (shape + 1) * size)
-    cells = np.floor((_samples(vertices, faces, _FINE * size, *whole) - origin) / size).astype(int)
+    cells = np.floor((_samples(vertices, faces, _SAMPLE_SPACING * size, *whole) - origin) / size).astype(int)
     cells = cells[((cells >= 0) & (cells < shape)).all(axis=1)]
     wall = np.zeros(shape, dtype=bool)
     wall[tuple(cells.T)] = True
@@ -96,14 +96,14 @@ def solid_of(
     if within is not None:
         places = origin + (seeds + 0.5) * size
         away, _ = cKDTree(within.points).query(places)
-        # what the surface encloses beyond the box reaches its sides, too: it is where the coarser voxels are
+        # where the surface extends beyond the box, its inside reaches the sides, too: the coarser solid covers it there
         far = np.bincount(label[tuple(seeds.T)], weights=away > 2.5 * within.size)
         reached = reached[far[reached] > 0.5 * np.bincount(label[tuple(seeds.T)])[reached]]
     outside = np.isin(label, reached) & ~wall
     solid = ndimage.binary_erosion(~outside, border_value=1)
     solid &= ~rim
-    if (count := int(solid.sum())) > _MOST_INSIDE:
-        coarser = size * (1.2 * count / _MOST_INSIDE) ** (1 / 3)
+    if (count := int(solid.sum())) > _MAX_VOXELS:
+        coarser = size * (1.2 * count / _MAX_VOXELS) ** (1 / 3)
         return solid_of(vertices, faces, coarser, low=low, high=high, within=within)
     depth = ndimage.distance_transform_edt(~outside) * size - 0.5 * size
     return _connected(solid, depth, origin, size)
@@ -124,14 +124,14 @@ def _connected(
         rows.append(number[here][both])
         columns.append(number[there][both])
         lengths.append(np.full(int(both.sum()), size * float(np.linalg.norm(d))))
-    ways = coo_matrix((np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
-    return VoxelSolid(origin + (np.argwhere(solid) + 0.5) * size, depth[solid], size, ways)
+    graph = coo_matrix((np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
+    return VoxelSolid(origin + (np.argwhere(solid) + 0.5) * size, depth[solid], size, graph)
 
 
 def capped(
     vertices: NDArray[np.float64], faces: NDArray[np.integer]
 ) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
-    """The surface with a fan over every hole; vertices at one place count as one."""
+    """The surface with a triangle fan over every hole; coincident vertices are merged."""
     scale = float(np.ptp(vertices, axis=0).max()) or 1.0
     _, first, same = np.unique(np.round(vertices / (1e-6 * scale)), axis=0, return_index=True, return_inverse=True)
     vertices, faces = vertices[first], same.ravel()[faces]
@@ -155,7 +155,7 @@ def _samples(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Points on the triangles that reach into a box, nowhere further apart than ``step``."""
+    """Samples of the triangles that intersect a box, spaced by at most ``step``."""
     corners = vertices[faces]
     corners = corners[((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)

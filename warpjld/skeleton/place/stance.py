@@ -1,4 +1,4 @@
-"""How a digitised body stands: its up, its left and forward, found from its two legs and its feet."""
+"""Stance of a digitised body: up, left and forward directions, found from its two legs and feet."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ __all__ = ["Stance", "find_stance", "pieces"]
 Array = NDArray[np.float64]
 
 _UPS = ((1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0))
-"""Axes and signs that may be up, the usual ones first."""
-_LEGS = (0.12, 0.2, 0.28, 0.36)  # heights at which there are two legs
-_ALIKE = 1.6  # flesh of one leg per the other's
-_TRUNK = (0.56, 0.64)  # heights at which there is one trunk
+"""Candidates for the up axis: (axis, sign), the usual ones first."""
+_LEGS = (0.12, 0.2, 0.28, 0.36)  # heights, as shares of the whole, at which two legs are expected
+_LEG_RATIO = 1.6  # largest ratio of the two legs' section areas
+_TRUNK = (0.56, 0.64)  # heights at which one trunk is expected
 
 
 @dataclass(frozen=True)
 class Stance:
-    """A body's frame.
+    """Frame of an upright body.
 
     Attributes:
         frame: Rows left, up and forward, shape (3, 3).
@@ -38,38 +38,38 @@ class Stance:
     height: float
 
     def inward(self, points: Array) -> Array:
-        """Points in the body's frame, heights as shares of one: x left, y up, z forward."""
+        """Points in the body's frame, per height of the body: x left, y up, z forward."""
         return (points - self.origin) @ self.frame.T / self.height
 
     def outward(self, points: Array) -> Array:
-        """Back from the body's frame."""
+        """Points back from the body's frame."""
         return points * self.height @ self.frame + self.origin
 
 
 def pieces(solid: VoxelSolid, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Connected pieces of some voxels, the largest first."""
+    """Connected components of the chosen voxels, the largest first."""
     numbers = np.flatnonzero(chosen)
-    _, label = connected_components(solid.part(chosen).ways, directed=False)
+    _, label = connected_components(solid.part(chosen).graph, directed=False)
     found = [numbers[label == k] for k in range(label.max(initial=-1) + 1)]
     return sorted(found, key=len, reverse=True)
 
 
 def find_stance(solid: VoxelSolid, label: str) -> Stance:
-    """The first axis along which two legs carry one trunk.
+    """The stance along the first candidate up axis with two legs under one trunk.
 
     Raises:
-        InputError: There is none.
+        InputError: No axis has them.
     """
     for axis, sign in _UPS:
         up = np.zeros(3)
         up[axis] = sign
-        found = _stands(solid, up)
+        found = _stance_along(solid, up)
         if found is not None:
             return found
     raise InputError(f"{label}: no upright body with two legs apart from one another")
 
 
-def _stands(solid: VoxelSolid, up: Array) -> Stance | None:
+def _stance_along(solid: VoxelSolid, up: Array) -> Stance | None:
     high = solid.points @ up
     low, height = float(high.min()), float(np.ptp(high))
     share = (high - low) / height
@@ -77,7 +77,7 @@ def _stands(solid: VoxelSolid, up: Array) -> Stance | None:
     legs = []
     for at in _LEGS:
         found = [p for p in pieces(solid, np.abs(share - at) < slab) if len(p) > 20]
-        if len(found) < 2 or len(found[0]) > _ALIKE * len(found[1]):
+        if len(found) < 2 or len(found[0]) > _LEG_RATIO * len(found[1]):
             return None
         if len(found) > 2 and len(found[2]) > 0.5 * len(found[1]):
             return None

@@ -1,7 +1,7 @@
 """Flexion axes from geometry (R20): segment × axis points out of the back of the hand or limb.
 
-Bone frames of files follow four conventions and none reliably, so axes come from where joints lie: a finger is a
-planar chain, whose plane its rest bend shows, and the palm's plane where it is straight.
+Bone frames follow four conventions, none of them reliably, so axes are derived from joint positions: a finger is a
+planar chain whose plane is given by its rest bend, or by the palm where it is straight.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["body_axes", "hand_axes", "perpendicular"]
 
 Points = Mapping[str, NDArray[np.float64]]
 
-# How much an expected hinge counts against the measured bend: squared sine of the bend at which both count alike
+# Weight of the expected axis against the measured bend: squared sine of the bend at which both weigh equally
 _FINGER_PRIOR = np.sin(np.radians(20.0)) ** 2
 _THUMB_PRIOR = np.sin(np.radians(25.0)) ** 2
 _LIMB_PRIOR = np.sin(np.radians(20.0)) ** 2
@@ -46,7 +46,7 @@ def _finger_axes(points: Points, digit: str, frame: HandFrame) -> dict[str, NDAr
     expected = _hinge(frame.dorsal, chain[-1] - chain[0])
     hinge = _common_hinge(chain, expected, _FINGER_PRIOR)
     axes = {f"{digit}.carpometacarpal": _hinge(frame.dorsal, chain[0] - carpal)}
-    return axes | _along(digit, chain, hinge)
+    return axes | _axes_along(digit, chain, hinge)
 
 
 def _thumb_axes(points: Points, frame: HandFrame) -> dict[str, NDArray[np.float64]]:
@@ -60,13 +60,13 @@ def _thumb_axes(points: Points, frame: HandFrame) -> dict[str, NDArray[np.float6
     target = bases[-1] - 0.5 * width * frame.dorsal
     bone = chain[-1] - chain[1]
     expected = perpendicular(np.cross(bone, target - chain[1]), bone)
-    return _along("thumb", chain, _common_hinge(chain, expected, _THUMB_PRIOR))
+    return _axes_along("thumb", chain, _common_hinge(chain, expected, _THUMB_PRIOR))
 
 
 def _common_hinge(
     chain: Sequence[NDArray[np.float64]], expected: NDArray[np.float64], prior: float
 ) -> NDArray[np.float64]:
-    """Axis most nearly perpendicular to all bones of a chain, and near the expected one as far as they leave it open.
+    """Axis most nearly perpendicular to all bones of a chain, regularised towards the expected axis.
 
     Minimises Σ (axis · bone)² + prior |axis − expected|².
     """
@@ -74,7 +74,7 @@ def _common_hinge(
     return unit(np.linalg.solve(bones.T @ bones + prior * np.eye(3), prior * expected))
 
 
-def _along(
+def _axes_along(
     digit: str, chain: Sequence[NDArray[np.float64]], hinge: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
     axes = {
@@ -90,16 +90,16 @@ def body_axes(
     up: NDArray[np.float64],
     forward: NDArray[np.float64],
 ) -> dict[str, NDArray[np.float64]]:
-    """Flexion axes of a body's joints, by convention.
+    """Flexion axes of a body's joints, by anatomical convention.
 
     Shoulders raise the arm forward, elbows bring the hand forward, hips raise the thigh forward, knees bring the heel
     back, ankles and toes point down, trunk, neck and head bow forward. Elbows and knees take the plane of their rest
-    bend where there is one.
+    bend if they are bent.
 
     Args:
         points: Canonical joints → positions [m].
         directions: Unit directions of their bones.
-        up: The body's up.
+        up: The body's up direction, a unit vector.
         forward: The direction it faces.
     """
     axes: dict[str, NDArray[np.float64]] = {}
@@ -129,9 +129,9 @@ def _hinge(dorsal: NDArray[np.float64], bone: NDArray[np.float64]) -> NDArray[np
 
 
 def perpendicular(axis: NDArray[np.float64], bone: NDArray[np.float64]) -> NDArray[np.float64]:
-    """``axis`` without its part along ``bone``, of length one."""
+    """``axis`` without its component along ``bone``, normalised."""
     direction = unit(bone)
-    for guess in (axis, *np.eye(3)):  # an axis along the bone says nothing: any perpendicular one does
+    for guess in (axis, *np.eye(3)):  # an axis along the bone is undetermined: any perpendicular one is taken
         across = guess - direction * (direction @ guess)
         length = np.linalg.norm(across)
         if length > 1e-6 * max(float(np.linalg.norm(guess)), 1e-30):

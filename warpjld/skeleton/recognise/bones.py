@@ -1,4 +1,4 @@
-"""Which way a joint's bone points, read from its frame: files keep it on +X, +Y, -Z or any other axis."""
+"""Axis of the joint frames along which bones point: +X, +Y, -Z or any other, depending on the file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["bone_axis", "bone_directions"]
 
-_ALIGNED = 0.97  # cosine from which a bone counts as lying on an axis of its frame
+_ALIGNED = 0.97  # smallest cosine at which a bone counts as aligned with an axis of its frame
 
 
 def bone_directions(tree: SourceTree, axis: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -21,7 +21,7 @@ def bone_directions(tree: SourceTree, axis: NDArray[np.float64]) -> NDArray[np.f
 
 
 def bone_axis(tree: SourceTree, pairs: list[tuple[int, int]]) -> NDArray[np.float64] | None:
-    """Axis of the joint frames on which bones lie, from (joint, next joint) pairs; None where they share none."""
+    """Axis of the joint frames that bones are aligned with, from (joint, next joint) pairs; None if there is none."""
     locals_ = []
     for joint, after in pairs:
         bone = tree.positions[after] - tree.positions[joint]

@@ -1,4 +1,4 @@
-"""Recognition by names: which joint plays which part, in any convention :mod:`names` reads."""
+"""Recognition of joints by their names, in any convention that :mod:`names` reads."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["roles_by_name"]
 
-# canonical joint: kinds that may stand for it, best first; "shoulder" means the joint itself in SMPL-X and the
-# clavicle in Mixamo, Godot and VRM: it is what the better words leave over
+# canonical joint: kinds that may stand for it, best first; "shoulder" is the joint itself in SMPL-X and the clavicle in
+# Mixamo, Godot and VRM, so it is used for whichever has no more specific name
 _ARM = (
     ("shoulder", ("upperarm", "shoulder")),
     ("elbow", ("forearm",)),
@@ -28,13 +28,14 @@ _LEG = (("hip", ("thigh", "hip")), ("knee", ("shin",)), ("ankle", ("ankle", "foo
 
 
 def roles_by_name(tree: SourceTree, flesh: JointFlesh | None = None) -> Roles:
-    """Parts found by names; empty where the names say nothing.
+    """Roles found by names; empty where no name is understood.
 
-    Joints that own skin come before others of the same name; what neither owns any nor ends a bone is no part.
+    Joints that own skin have priority over others of the same name; joints that neither own skin nor end a bone are
+    ignored.
     """
     flesh = flesh or JointFlesh(tree, None)
     meanings = [Meaning() if flesh.dead[j] else read_name(name) for j, name in enumerate(tree.names)]
-    for j in map(int, np.flatnonzero(flesh.passing)):  # what goes on is no end
+    for j in map(int, np.flatnonzero(flesh.passing)):  # a joint with descendants that own skin is no end
         if meanings[j].rank == 4 or (meanings[j].kind or "").endswith(" end"):
             meanings[j] = Meaning()
     roles = Roles(how="names")
@@ -78,7 +79,7 @@ def _hand(
         if len(below) == 1:
             digits[str(below.pop())].insert(0, j)
     carpals = kinds[side, "carpal"]
-    if tree.flat and len(carpals) == len(_PALM):  # counted from the index finger (MakeHuman, DAZ, Rigify)
+    if tree.flat and len(carpals) == len(_PALM):  # numbered from the index finger (MakeHuman, DAZ, Rigify)
         for digit, j in zip(_PALM, sorted(carpals, key=lambda j: meanings[j].number or 0), strict=True):
             digits[digit].append(j)
     named = kinds[side, "wrist"]
@@ -104,12 +105,12 @@ def _limbs(kinds: dict[tuple[str | None, str], list[int]], side: str, roles: Rol
             kind = next((k for k in candidates if kinds[side, k] and k not in taken), None)
             if kind:
                 taken.add(kind)
-                # of upperarm01 and upperarm02 the first is the joint, the others divide the limb
+                # of upperarm01 and upperarm02 the first is the joint, the others subdivide the limb
                 roles.body[f"{side}.{name}"] = kinds[side, kind][0]
 
 
 def _forearm_stub(tree: SourceTree, side: str, roles: Roles) -> None:
-    """The built-in hand ends in a stub whose root is no elbow, and is called so."""
+    """Rename the elbow of the built-in hand, whose skeleton is cut off at the forearm, to ``forearm``."""
     elbow = roles.body.get(f"{side}.elbow")
     if elbow is not None and tree.names[elbow] == f"{side}.forearm":
         roles.body[f"{side}.forearm"] = roles.body.pop(f"{side}.elbow")

@@ -1,4 +1,4 @@
-"""Recognition by the tree's shape, for files whose names say nothing (bone_001, …)."""
+"""Recognition by the tree's topology and geometry, for files whose names carry no meaning (bone_001, …)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["hands_by_shape", "roles_by_shape"]
 
 
 def roles_by_shape(tree: SourceTree, flesh: JointFlesh | None = None) -> Roles:
-    """Hands, or a body with two; empty for anything else.
+    """Hands, or a body with two hands; empty for anything else.
 
-    Joints without flesh that end nothing are left aside; a flat file is first chained by its bone axes.
+    Joints without skin that end no bone are left out; a flat file is first linked into chains by its bone axes.
     """
     flesh = flesh or JointFlesh(tree, None)
     small, numbers, hands = _find_hands(tree, flesh)
@@ -32,13 +32,13 @@ def roles_by_shape(tree: SourceTree, flesh: JointFlesh | None = None) -> Roles:
 
 
 def hands_by_shape(tree: SourceTree, flesh: JointFlesh) -> list[HandRoles]:
-    """Hands alone, without sides."""
+    """Hands only, without sides."""
     _, numbers, hands = _find_hands(tree, flesh)
     return [HandRoles(None, {name: numbers[j] for name, j in hand.joints.items()}) for hand in hands]
 
 
 def _find_hands(tree: SourceTree, flesh: JointFlesh) -> tuple[SourceTree, list[int], list[HandRoles]]:
-    """The tree without dead joints, the number in ``tree`` of each of its joints, and hands in its own numbers."""
+    """The tree without dead joints, the index in ``tree`` of each of its joints, and hands in the pruned indices."""
     small, numbers = prune(tree, flesh)
     if small.flat:
         small = reconnect(small)

@@ -1,4 +1,4 @@
-"""Joint tree and surface → canonical skeleton."""
+"""Conversion of a file's joint tree and surface to a canonical skeleton."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from warpjld.skeleton.recognise.flesh import JointFlesh, without_flesh
 from warpjld.skeleton.recognise.hand_frame import chirality
 from warpjld.skeleton.recognise.layout import Layout, lay_out
 from warpjld.skeleton.recognise.leaf_ends import add_leaf_ends
-from warpjld.skeleton.recognise.painted import Painted, let_flesh_lead
+from warpjld.skeleton.recognise.painted import Painted, prefer_skinned_joints
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.roles import HandRoles, Roles
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -31,7 +31,7 @@ __all__ = ["Canonical", "canonical_skeleton"]
 
 _STRAIGHT = np.sin(np.radians(10.0))
 _OTHER = {"left": "right", "right": "left"}
-_SURE = 0.15  # chirality from which rest pose and thumb tell left from right
+_CLEAR = 0.15  # smallest absolute chirality that decides between left and right
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +40,10 @@ class Canonical:
 
     Attributes:
         skeleton: The skeleton.
-        sources: Joint of the file for each of its joints, -1 for added ones.
+        sources: Joint of the file for each joint of the skeleton, -1 for added ones.
         owner: Joint of the skeleton that each joint of the file belongs to, shape (N,).
         notes: What was recognised, added, merged or moved.
-        suspicious: What is probably wrong, and what to do about it.
+        suspicious: Probable errors, each with a remedy.
     """
 
     skeleton: Skeleton
@@ -66,19 +66,22 @@ def canonical_skeleton(
     painted: Painted | None = None,
     placed: bool = False,
 ) -> Canonical:
-    """Recognise a tree inside its surface.
+    """Build the canonical skeleton of a tree and its surface.
 
     Args:
         tree: The file's joints [m].
         vertices: Surface [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
-        roles: What was recognised in it, as from :func:`.recognise`, which is asked where they are None.
-        shares: Share of the surface that each joint of the file moves, shape (N,); None where no skin tells.
-        side: Side of a single hand, overriding what names and shape say.
-        axes: Flexion axes the file states, by its joint numbers.
-        limits: Channel limits [rad] the file states, likewise.
-        painted: Whose skin is whose, by its joint numbers, where the file says.
-        placed: Whether an animator placed the joints: none is merged, moved or added.
+        roles: Recognised joints, as from :func:`.recognise`, which is called if None.
+        shares: Share of the surface that each joint of the file moves, shape (N,); None without painted weights.
+        side: Side of a single hand, overriding names and shape.
+        axes: Flexion axes stated in the file, by the file's joint indices.
+        limits: Channel limits [rad] stated in the file, likewise.
+        painted: Painted weights, by the file's joint indices, if the file has any.
+        placed: Whether the joints were placed by hand: none is merged, moved or added.
+
+    Raises:
+        InputError: A hand's side cannot be determined, or a stated flexion axis lies along its bone.
     """
     if roles is None:
         roles = recognise(tree, shares)
@@ -105,7 +108,7 @@ def canonical_skeleton(
     if place is not None:
         layout.positions[layout.names.index("pelvis")] = place
     if painted is not None:
-        let_flesh_lead(layout, tree, painted)
+        prefer_skinned_joints(layout, tree, painted)
     if roles.body and not placed:
         _extremities(layout, vertices, faces)
     if not placed:
@@ -115,7 +118,7 @@ def canonical_skeleton(
 
 
 def _release_partial_hands(roles: Roles, side: str | None) -> None:
-    """A few fingers without index and pinky span no palm: their joints stay as they are, in canonical names."""
+    """Hands without index and pinky define no palm: their joints become plain joints with canonical names."""
     for hand in [h for h in roles.hands if not {"index.base", "pinky.base", "index.knuckle2"} <= set(h.joints)]:
         roles.hands.remove(hand)
         prefix = f"{side or hand.side}." if side or hand.side else ""
@@ -125,13 +128,13 @@ def _release_partial_hands(roles: Roles, side: str | None) -> None:
 
 
 def _swap_mirrored_sides(tree: SourceTree, roles: Roles) -> None:
-    """Under a node that mirrors, what names call a right hand is a left one, and so with all of a body."""
+    """Exchange left and right where nodes with a negative determinant mirror all hands."""
     sided = [hand for hand in roles.hands if hand.side is not None]
     mirrored = [
         hand
         for hand in sided
         if np.linalg.det(tree.frames[hand.joints.get("wrist", hand.joints["index.base"]), :3, :3]) < 0.0
-        and _seen({name: tree.positions[j] for name, j in hand.joints.items()}) == _OTHER[hand.side or "left"]
+        and _side_by_shape({name: tree.positions[j] for name, j in hand.joints.items()}) == _OTHER[hand.side or "left"]
     ]
     if not sided or len(mirrored) < len(sided):
         return
@@ -145,17 +148,17 @@ def _swap_mirrored_sides(tree: SourceTree, roles: Roles) -> None:
     roles.notes.append("mirrored by its nodes: left and right of its names are exchanged")
 
 
-def _seen(points: Mapping[str, NDArray[np.float64]]) -> str | None:
-    """The side that rest pose and thumb tell."""
+def _side_by_shape(points: Mapping[str, NDArray[np.float64]]) -> str | None:
+    """Side of a hand by its chirality; None where that is not clear."""
     turn = chirality(points) if {"wrist", "index.base", "pinky.base"} <= set(points) else 0.0
-    return None if abs(turn) < _SURE else ("right" if turn > 0 else "left")
+    return None if abs(turn) < _CLEAR else ("right" if turn > 0 else "left")
 
 
 def _side(hand: HandRoles, points: Mapping[str, NDArray[np.float64]], given: str | None, doubts: list[str]) -> str:
-    seen = _seen(points)
+    seen = _side_by_shape(points)
     chosen = given or hand.side or seen
     if chosen is None:
-        raise InputError("neither names nor shape tell whether this is a left or a right hand: give its side")
+        raise InputError("cannot tell by names or shape whether this is a left or a right hand: give its side")
     if seen not in (None, chosen):
         doubts.append(
             f"named a {chosen} hand, but thumb and fingers look like a {seen} one, or bend backwards at rest: "
@@ -178,7 +181,7 @@ def _extremities(layout: Layout, vertices: NDArray[np.float64], faces: NDArray[n
 
 
 def _last_bones(tree: SourceTree, hand: HandRoles) -> dict[str, NDArray[np.float64]]:
-    """Directions of the bones beyond the last joints of digits without tips, where frames tell."""
+    """Directions of the bones beyond the last joints of digits without tips, where joint frames give them."""
     pairs: list[tuple[int, int]] = []
     last: list[str] = []
     for digit in ("pinky", "ring", "middle", "index", "thumb"):
@@ -245,7 +248,7 @@ def _bend(skeleton: Skeleton, joint: int) -> NDArray[np.float64]:
 
 
 def _facing(layout: Layout, number: Mapping[str, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Up and forward of a body; Y and Z where it does not tell."""
+    """Up and forward directions of a body; Y and Z where its joints do not determine them."""
     up, forward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     if "head" in number and "pelvis" in number:
         up = unit(layout.positions[number["head"]] - layout.positions[number["pelvis"]])

@@ -1,4 +1,4 @@
-"""Hands as recognised, checked for what cannot be right: digits unlike on both sides."""
+"""Check of recognised hands: digits that differ between left and right."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["check_hands"]
 
-_UNEQUAL = 1.5  # one side's length of a bone per the other's, as a share of the digits', from which it is doubtful
+_UNEQUAL = 1.5  # suspicious ratio of a bone's length on both sides, relative to the digit's median ratio
 
 
 def check_hands(tree: SourceTree, roles: Roles) -> None:
-    """Tell digits whose bones differ between left and right: a joint was taken for another on one side."""
+    """Report digits whose bones differ between left and right: a joint was probably mistaken on one side."""
     sides = {hand.side: hand for hand in roles.hands}
     if "left" not in sides or "right" not in sides:
         return
@@ -30,7 +30,7 @@ def check_hands(tree: SourceTree, roles: Roles) -> None:
 
 
 def _bones(tree: SourceTree, hand: HandRoles, digit: str) -> dict[str, float]:
-    """Lengths of a digit's bones by the joint they begin at."""
+    """Lengths of a digit's bones, by the name of the joint they start at."""
     names = [f"{digit}.{joint}" for joint in ("carpometacarpal", *FINGER_JOINTS) if f"{digit}.{joint}" in hand.joints]
     at = [tree.positions[hand.joints[name]] for name in names]
     lengths = np.linalg.norm(np.diff(np.array(at), axis=0), axis=1) if len(at) > 1 else []

@@ -1,7 +1,7 @@
-"""Arms and legs as names propose them, checked by the chains' geometry: what disagrees is settled by it, or told.
+"""Check of arms and legs, as recognised by names, against the geometry of their chains; conflicts are resolved.
 
-A leg is a line of joints from where the legs part to the ankle; hip and knee part it into two segments of like length,
-on both sides at the same places. So ``LeftLeg`` above ``LeftShin`` is a thigh, whatever it is elsewhere.
+A leg is a chain of joints from the crotch to the ankle; hip and knee divide it into two segments of similar length, at
+the same places on both sides. So ``LeftLeg`` above ``LeftShin`` is a thigh, whatever it is elsewhere.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["check_limbs"]
 
 _MAP = f"state it with {BY_MAP}"
-_PLAUSIBLE = np.log(2.0)  # lower per upper segment may be half or twice the usual
-_CLEARLY = np.log(1.3)  # by which one division of a limb fits better than another
-_AT_TRUNK = 0.03  # of the limb: a joint nearer than this to where limbs part is none of the limb's
-_UNEQUAL = 1.25  # left per right length from which one is doubtful
+_PLAUSIBLE = np.log(2.0)  # largest plausible misfit: lower per upper segment half or twice the usual
+_CLEARLY_BETTER = np.log(1.3)  # smallest difference of misfits by which one division of a limb is clearly better
+_AT_TRUNK = 0.03  # joints nearer to the branching joint than this share of the limb do not belong to it
+_UNEQUAL = 1.25  # suspicious ratio of lengths on both sides
 
 
 @dataclass(frozen=True)
@@ -51,16 +51,16 @@ _LEG = _Kind("leg", "hip", "knee", "ankle", SHIN_RATIO)
 @dataclass
 class _Limb:
     side: str
-    chain: list[int]  # from the trunk, left out, to wrist or ankle
+    chain: list[int]  # from the branching joint (excluded) to wrist or ankle
     named: tuple[int | None, int | None] = (None, None)
     fixed: dict[int, Collection[int]] = field(default_factory=dict)
     found: tuple[int, int] | None = None
 
 
 def check_limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str] = ()) -> None:
-    """Settle hips, knees, shoulders, elbows and what hangs on them, in ``roles``; joints ``stated`` stay as they are.
+    """Correct hips, knees, shoulders, elbows and their dependants in ``roles``; joints ``stated`` are kept.
 
-    Only in a body's hierarchy: a hand with a forearm, or a flat file, has no chains to judge by.
+    Only in a body's hierarchy: a hand with a forearm, or a flat file, has no chains to compare with.
     """
     if tree.flat or not any(name == "pelvis" or name.startswith(("spine", "head", "neck")) for name in roles.body):
         return
@@ -68,8 +68,8 @@ def check_limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Colle
         limbs = _limbs(tree, roles, flesh, kind, stated)
         _divide(tree, limbs, kind)
         for limb in limbs:
-            _settle(tree, roles, limb, kind, stated)
-        _compare(tree, roles, kind)
+            _apply(tree, roles, limb, kind, stated)
+        _compare_sides(tree, roles, kind)
 
 
 def _limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, stated: Collection[str]) -> list[_Limb]:
@@ -82,7 +82,7 @@ def _limbs(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, state
     out = []
     for side, end in ends.items():
         other = ends.get("right" if side == "left" else "left")
-        above = _parting(tree, roles, end, other, trunk)
+        above = _branching_joint(tree, roles, end, other, trunk)
         if above is None:
             continue
         chain = [j for j in path_below(tree, above, end) if j not in trunk]
@@ -107,7 +107,7 @@ def _is_helper(tree: SourceTree, flesh: JointFlesh, joint: int, above: int, size
 
 
 def _end(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, side: str) -> int | None:
-    """Wrist or ankle: by name, or down from what is known of the limb."""
+    """Wrist or ankle: by name, or else searched down the known part of the limb."""
     if kind is _ARM:
         hand = next((h for h in roles.hands if h.side == side), None)
         if hand is not None and "wrist" in hand.joints:
@@ -127,19 +127,19 @@ def _end(tree: SourceTree, roles: Roles, flesh: JointFlesh, kind: _Kind, side: s
     if ball in leg[2:]:
         ankle = leg[leg.index(ball) - 1]
     elif len(leg) > 1:
-        above = [j for j in (int(tree.parents[leg[0]]),) if j >= 0]  # the leg's turns are looked for in its lower half
+        above = [j for j in (int(tree.parents[leg[0]]),) if j >= 0]  # the ankle is searched in the leg's lower half
         whole = [*above, *leg]
         ankle = whole[ankle_of(tree, whole)]
     else:
         return None
-    _release(roles, ankle)
+    _remove_roles(roles, ankle)
     roles.body[f"{side}.ankle"] = ankle
     roles.notes.append(f"{side}.ankle '{tree.names[ankle]}': by the leg's shape")
     return ankle
 
 
 def _wrist(tree: SourceTree, roles: Roles, flesh: JointFlesh, side: str) -> int | None:
-    """Of joints in a line below the shoulder (``arm_joint_L_1`` …) the one that ends a forearm of the usual length."""
+    """Of a chain of joints below the shoulder (``arm_joint_L_1`` …), the one that gives a forearm of usual length."""
     shoulder = roles.body.get(f"{side}.shoulder")
     if shoulder is None or f"{side}.elbow" in roles.body:
         return None
@@ -157,8 +157,8 @@ def _wrist(tree: SourceTree, roles: Roles, flesh: JointFlesh, side: str) -> int 
     return wrist
 
 
-def _parting(tree: SourceTree, roles: Roles, end: int, other: int | None, trunk: set[int]) -> int | None:
-    """The joint at which both limbs of a kind, or one limb and the trunk, part."""
+def _branching_joint(tree: SourceTree, roles: Roles, end: int, other: int | None, trunk: set[int]) -> int | None:
+    """Lowest common ancestor of both limbs of a kind, or of one limb and the trunk."""
     above = tree.ancestors(end)
     if other is not None:
         both = set(tree.ancestors(other))
@@ -167,13 +167,14 @@ def _parting(tree: SourceTree, roles: Roles, end: int, other: int | None, trunk:
 
 
 def _divide(tree: SourceTree, limbs: list[_Limb], kind: _Kind) -> None:
-    """First and second joint of each limb: as named where plausible, else as the other side or geometry has it."""
+    """Find first and second joint of each limb: as named if plausible, else mirrored from the other side, else by
+    geometry."""
     for limb in limbs:
         first, second = limb.named
         if first is not None and second is not None and _is_plausible(tree, limb, (first, second), kind):
-            limb.found = _less_vague(tree, limb, first, second, kind)
-    open_ = [limb for limb in limbs if limb.found is None]
-    for limb in open_:
+            limb.found = _resolve_ambiguous_name(tree, limb, first, second, kind)
+    undecided = [limb for limb in limbs if limb.found is None]
+    for limb in undecided:
         other = next((o for o in limbs if o is not limb and o.found and len(o.chain) == len(limb.chain)), None)
         if other is not None and other.found is not None and not limb.fixed:
             mirrored = (
@@ -186,17 +187,17 @@ def _divide(tree: SourceTree, limbs: list[_Limb], kind: _Kind) -> None:
         limb.found = _by_geometry(tree, limb, kind)
 
 
-def _less_vague(tree: SourceTree, limb: _Limb, first: int, second: int, kind: _Kind) -> tuple[int, int]:
-    """``Shoulder`` may be the joint or the clavicle, ``Hip`` the joint or the side of the pelvis: lengths tell."""
+def _resolve_ambiguous_name(tree: SourceTree, limb: _Limb, first: int, second: int, kind: _Kind) -> tuple[int, int]:
+    """Decide by lengths whether ``Shoulder`` is the joint or the clavicle, ``Hip`` the joint or part of the pelvis."""
     if 0 in limb.fixed or read_name(tree.names[first]).kind not in ("shoulder", "hip"):
         return first, second
     own = divide_limb(tree, limb.chain, kind.ratio, {0: (first,), 1: (second,)})[2]
     other, _, misfit = divide_limb(tree, limb.chain, kind.ratio, {1: (second,)})
-    return (other if misfit + _CLEARLY < own else first), second
+    return (other if misfit + _CLEARLY_BETTER < own else first), second
 
 
 def _by_geometry(tree: SourceTree, limb: _Limb, kind: _Kind) -> tuple[int, int] | None:
-    """Keeping what names say where that leaves a plausible limb."""
+    """The division of a limb with the smallest misfit, keeping named joints if that is plausible."""
     named = {k: (j,) for k, j in enumerate(limb.named) if j is not None and j in limb.chain}
     tries: list[dict[int, Collection[int]]] = [{**named, **limb.fixed}, limb.fixed]
     for fixed in tries:
@@ -220,7 +221,7 @@ def _is_plausible(tree: SourceTree, limb: _Limb, pair: tuple[int, int], kind: _K
     return limb_misfit(at[first], at[second], end, whole, kind.ratio) < _PLAUSIBLE
 
 
-def _settle(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Collection[str]) -> None:
+def _apply(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Collection[str]) -> None:
     names = (f"{limb.side}.{kind.first}", f"{limb.side}.{kind.second}")
     if limb.found is None:
         first, second = limb.named
@@ -240,7 +241,7 @@ def _settle(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Co
     changed = []
     for name, joint in zip(names, limb.found, strict=True):
         if roles.body.get(name) != joint and name not in stated:
-            _release(roles, joint)
+            _remove_roles(roles, joint)
             roles.body[name] = joint
             changed.append(f"{name} '{tree.names[joint]}'")
     if changed:
@@ -250,7 +251,7 @@ def _settle(tree: SourceTree, roles: Roles, limb: _Limb, kind: _Kind, stated: Co
 
 
 def _clavicle(tree: SourceTree, roles: Roles, limb: _Limb, stated: Collection[str]) -> None:
-    """The first joint between trunk and shoulder, where the named one is none or the shoulder itself."""
+    """Set the clavicle to the first joint between trunk and shoulder, unless the named one is already among these."""
     name = f"{limb.side}.clavicle"
     assert limb.found is not None
     before = limb.chain[: limb.chain.index(limb.found[0])]
@@ -262,13 +263,13 @@ def _clavicle(tree: SourceTree, roles: Roles, limb: _Limb, stated: Collection[st
         roles.notes.append(f"{name} '{tree.names[before[0]]}': by the arm's shape")
 
 
-def _release(roles: Roles, joint: int) -> None:
+def _remove_roles(roles: Roles, joint: int) -> None:
     for name in [name for name, j in roles.body.items() if j == joint]:
         del roles.body[name]
 
 
-def _compare(tree: SourceTree, roles: Roles, kind: _Kind) -> None:
-    """Left and right segments of a limb are about equally long."""
+def _compare_sides(tree: SourceTree, roles: Roles, kind: _Kind) -> None:
+    """Report segments of clearly different length on both sides."""
     ends = {h.side: h.joints["wrist"] for h in roles.hands if "wrist" in h.joints} if kind is _ARM else {}
     for a, b in ((kind.first, kind.second), (kind.second, kind.end)):
         lengths = []

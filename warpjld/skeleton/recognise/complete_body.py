@@ -1,4 +1,4 @@
-"""What a body's tree leaves out or doubles: one pelvis, and the extremities that its last bones point at (R13)."""
+"""Completion of a body's tree: coincident pelvis joints are merged, extremities are added (R13)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["find_extremities", "merge_pelvis"]
 
-_EXPECTED = {"ball": 0.4, "wrist": 0.7, "head": 1.2}  # last segment per length of the bone that points into it
-_SAME = 1e-3  # of the body's size: heads that count as one
+_EXPECTED = {"ball": 0.4, "wrist": 0.7, "head": 1.2}  # length of the end segment, per length of its parent bone
+_SAME = 1e-3  # distance below which joints coincide, per size of the body
 
 
 def merge_pelvis(tree: SourceTree, roles: Roles) -> NDArray[np.float64] | None:
-    """Let the pelvis be where spine and legs part, in place of a root and several bones with one head.
+    """Place the pelvis where spine and legs meet, merging a root and several bones that start there.
 
-    Takes the lowest spine joint out of ``roles`` where it shares that head; the others are renumbered.
+    Removes the lowest spine joint from ``roles`` if it coincides with the pelvis; the others are renumbered.
 
     Returns:
         Position of the pelvis, or None where the body has none.
@@ -50,7 +50,7 @@ def find_extremities(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
 ) -> dict[str, tuple[str, NDArray[np.float64]]]:
-    """Ends of toes, head and handless arms, which most files leave out.
+    """Ends of toes, head and arms without hands, which most files leave out.
 
     Args:
         places: Canonical joints → positions [m].
@@ -59,7 +59,7 @@ def find_extremities(
         faces: Its triangles, shape (T, 3).
 
     Returns:
-        New canonical names → the joint they hang on, and their position.
+        New canonical name → (parent joint, position [m]).
     """
     out: dict[str, tuple[str, NDArray[np.float64]]] = {}
     for name in sorted(set(places) - set(parents.values())):

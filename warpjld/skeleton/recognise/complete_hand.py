@@ -1,4 +1,4 @@
-"""All 25 joints of a hand, from the ones a file has: carpal ends, missing knuckles and fingertips are added."""
+"""Completion of a hand to all 25 joints: carpal ends, missing knuckles and fingertips are added."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from warpjld.skeleton.recognise.section import nearby
 
 __all__ = ["complete_hand"]
 
-_CARPAL_SHARE = 0.4  # of the way from the wrist to a finger's base (WebXR hand: 0.39 index, 0.5 pinky)
+_CARPAL_SHARE = 0.4  # carpal end, as a share of wrist to finger base (WebXR hand: 0.39 index, 0.5 pinky)
 _FINGERS = tuple(d for d in DIGITS if d != "thumb")
 
 
@@ -26,14 +26,14 @@ def complete_hand(
     faces: NDArray[np.int32],
     label: str = "hand",
 ) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
-    """Positions of a hand's joints, missing ones added and impossible ones moved.
+    """Positions of all of a hand's joints; missing ones are added, misplaced ones moved.
 
     Args:
         found: Canonical names without the side → positions [m].
-        directions: Direction of the bone each last joint carries, where its frame tells.
+        directions: Direction of the bone beyond each last joint, where its frame gives one.
         vertices: Surface [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
-        label: How notes call this hand.
+        label: Name of this hand in notes.
 
     Returns:
         Positions, and notes on what was added or moved.
@@ -70,7 +70,7 @@ def _wrist(points: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     if carpals:
         start = np.mean(carpals, axis=0)
         return start - 0.6 * (bases - start)
-    # palm and middle finger are about equally long; the first phalanx is 0.45 of a finger
+    # palm and middle finger are about equally long; the proximal phalanx is 0.45 of a finger
     forward = np.mean([points[f"{d}.knuckle2"] - points[f"{d}.base"] for d in fingers], axis=0)
     return bases - 2.2 * forward
 
@@ -87,7 +87,7 @@ def _carpal_ends(points: dict[str, NDArray[np.float64]], fingers: list[str], not
     if added:
         notes.append(f"{label}: no carpal ends of {', '.join(added)} of their own: placed between wrist and base")
     groups: list[list[str]] = []
-    for digit in fingers:  # neighbours that share one head
+    for digit in fingers:  # neighbours whose carpal ends coincide
         at = points[f"{digit}.carpometacarpal"]
         if groups and np.linalg.norm(at - points[f"{groups[-1][-1]}.carpometacarpal"]) < 1e-3 * np.linalg.norm(
             points[f"{digit}.base"] - at
@@ -100,7 +100,7 @@ def _carpal_ends(points: dict[str, NDArray[np.float64]], fingers: list[str], not
         return
     row = points[f"{fingers[0]}.base"] - points[f"{fingers[-1]}.base"]  # towards the ulnar side
     heads = [points[f"{g[0]}.carpometacarpal"] for g in groups]
-    # heads two fingers apart are one spacing of two; a lone head takes a share of the knuckle row's
+    # two groups: their distance spans two fingers; a single group takes a share of the knuckle row's spacing
     across = (heads[0] - heads[-1]) / 2 if len(groups) == 2 else 0.5 * row / max(len(fingers) - 1, 1)
     for group in shared:
         for k, digit in enumerate(group):
@@ -134,7 +134,7 @@ def _missing_knuckles(points: dict[str, NDArray[np.float64]], digit: str, notes:
     missing = [name for name in chain if name not in points]
     for name in missing:
         k = chain.index(name)
-        left = 4 - k  # this joint and those up to the tip share what is left
+        left = 4 - k  # segments from the joint before to the tip
         points[name] = points[chain[k - 1]] + (points[chain[-1]] - points[chain[k - 1]]) / left
     if missing:
         notes.append(f"{label}: {', '.join(missing)} added between the neighbouring joints")

@@ -1,4 +1,4 @@
-"""One digit's joints out of all that are named after it: helpers, doubles and ends beyond the end are left out."""
+"""Selection of one digit's joint chain among all joints named after it: helpers and duplicates are left out."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ __all__ = ["digit_chain"]
 def digit_chain(
     tree: SourceTree, joints: Sequence[int], meanings: Sequence[Meaning], flesh: JointFlesh, wrist: int | None
 ) -> Digit | None:
-    """The joints that make one digit, from the root outwards; None where they are no chain.
+    """The joints that form one digit, from the root outwards; None where they form no chain.
 
     Args:
         tree: The file's joints.
-        joints: Those named after the digit, in any order.
-        meanings: What the names of all joints of the file say.
+        joints: Joints named after the digit, in any order.
+        meanings: Parsed names of all joints of the file.
         flesh: Which joints own skin.
-        wrist: The hand's wrist, where one is known.
+        wrist: The hand's wrist, if known.
     """
-    chain = sorted(joints, key=lambda j: _order(tree, meanings[j], j))
+    chain = sorted(joints, key=lambda j: _sort_key(tree, meanings[j], j))
     if not tree.flat:
-        chain = _one_line(tree, chain)
+        chain = _longest_chain(tree, chain)
     ranks = [meanings[j].rank for j in chain]
     if flesh.known:
         chain, ranks = _without_helpers(tree, chain, meanings, flesh)
@@ -36,31 +36,31 @@ def digit_chain(
     return Digit(chain, ranks)
 
 
-def _order(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int, int]:
-    """By depth; where that tells nothing by rank, which metacarpal, 01, 02 and tip share with numbers."""
-    return tree.depth(joint), *_place(meaning), joint
+def _sort_key(tree: SourceTree, meaning: Meaning, joint: int) -> tuple[int, int, int, int]:
+    """Sort key: depth, then rank (metacarpal, 01, 02, tip), then number, then index."""
+    return tree.depth(joint), *_rank_key(meaning), joint
 
 
-def _place(meaning: Meaning) -> tuple[int, int]:
+def _rank_key(meaning: Meaning) -> tuple[int, int]:
     number = meaning.number or 0
     return (number if meaning.rank is None else meaning.rank), number
 
 
-def _one_line(tree: SourceTree, chain: list[int]) -> list[int]:
-    """The longest line of descent among joints sorted by depth."""
+def _longest_chain(tree: SourceTree, chain: list[int]) -> list[int]:
+    """The longest chain of ancestors and descendants among joints sorted by depth."""
     best: dict[int, list[int]] = {}
     for j in chain:
         above = next((a for a in tree.ancestors(j) if a in best), None)
         best[j] = [*(best[above] if above is not None else []), j]
     longest = max(best.values(), key=len, default=[])
-    # joints on no common line are one digit still where nothing else hangs together (roots of a partly flat file)
+    # in a partly flat file, where no two joints are related, all of them form the digit
     return longest if len(longest) > 1 else chain
 
 
 def _without_helpers(
     tree: SourceTree, chain: list[int], meanings: Sequence[Meaning], flesh: JointFlesh
 ) -> tuple[list[int], list[int | None]]:
-    """Joints without flesh stay where their name has a place among the others', and one as the end."""
+    """Leave out joints without skin, but for those whose name fills a gap in the sequence and one as the end."""
     bare, fleshy = flesh.bare, [j for j in chain if not flesh.bare[j]]
     if not fleshy:
         return chain, [meanings[j].rank for j in chain]
@@ -79,16 +79,16 @@ def _without_helpers(
             taken.add(rank)
             inner.append(j)
     ranks = [meanings[j].rank for j in inner]
-    # the cleanest name: of index-finger-tip and index-finger-tip_null the first
+    # the shortest name: index-finger-tip before index-finger-tip_null
     end = min(beyond, key=lambda j: (meanings[j].rank != 4, len(tree.names[j])), default=None)
     return (inner, ranks) if end is None else ([*inner, end], [*ranks, 4])
 
 
 def _last_by_rank(chain: list[int], meanings: Sequence[Meaning], fleshy: list[int]) -> int:
-    order = [_place(meanings[j]) for j in chain]
+    order = [_rank_key(meanings[j]) for j in chain]
     return max(k for k, at in enumerate(order) if at <= max(order[chain.index(j)] for j in fleshy))
 
 
 def _stem(name: str) -> str:
-    """A name without its numbers: joints of one digit share it where numbers count them."""
+    """A name with its numbers replaced: shared by joints of one digit that are only numbered."""
     return re.sub(r"\d+", "#", name.lower())

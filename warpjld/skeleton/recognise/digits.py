@@ -1,7 +1,7 @@
-"""From the joints of a hand's digits, in order, to canonical joints, whatever a convention leaves out or adds.
+"""Assignment of a hand's digit chains to canonical joints, for any convention of extra or missing joints.
 
-Whether fingers of four joints begin with a metacarpal is one decision for all hands of a file: finger by finger it
-would fall out differently where proportions lie near the border.
+Whether fingers of four joints begin with a metacarpal is decided once for all hands of a file: finger by finger, the
+decision would vary where proportions are near the threshold.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ __all__ = ["Digit", "HandDigits", "assign_hands"]
 # distance from the wrist to a chain's first joint, per length of its first bone: about 0.7 where that bone is a
 # metacarpal, about 2 where it is the first phalanx (WebXR, Anny, MANO)
 _METACARPAL_RATIO = 1.3
-_CLEAR_RATIO = 1.45  # by which a ratio must differ from that to count as one vote
-# spread of the chains' first joints per spread of their second ones: metacarpals meet at the wrist
+_CLEAR_RATIO = 1.45  # deviation from that ratio, as a factor, that counts as one vote
+# spread of the chains' first joints per spread of their second ones: metacarpals converge at the wrist
 _METACARPAL_SPREAD, _CLEAR_SPREAD = 0.75, 1.3
-_BARE = 0.1  # flesh of a last joint per that of the one before: below, it is an end
-_FLESHY = 0.25  # likewise: above, it is surely a joint
+_BARE = 0.1  # largest ratio of the last joint's skin to the one before at which it is an end
+_FLESHY = 0.25  # smallest ratio at which it is certainly a joint
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Digit:
 
     Attributes:
         joints: Joint numbers.
-        ranks: What names say of each: 0 metacarpal … 4 tip, or None.
+        ranks: Rank by name of each: 0 metacarpal … 4 tip, or None.
     """
 
     joints: list[int]
@@ -44,11 +44,11 @@ class Digit:
 
 @dataclass
 class HandDigits:
-    """A hand before its digits are told apart joint by joint.
+    """A hand as digit chains, before their joints are assigned.
 
     Attributes:
         side: ``left``, ``right`` or None.
-        wrist: Its wrist, where there is one.
+        wrist: Its wrist, if it has one.
         digits: ``thumb``, ``index``, … → joints.
     """
 
@@ -61,7 +61,7 @@ def assign_hands(tree: SourceTree, hands: Sequence[HandDigits], flesh: JointFles
     """Canonical joints of all hands of a file, names without the side; fewer than 25 where the file has fewer."""
     for hand in hands:
         for digit in hand.digits.values():
-            _leave_out_zero_bones(tree, digit)
+            _drop_zero_bones(tree, digit)
     metacarpals = _fingers_begin_with_metacarpals(tree, hands, flesh)
     out = []
     for hand in hands:
@@ -73,8 +73,8 @@ def assign_hands(tree: SourceTree, hands: Sequence[HandDigits], flesh: JointFles
     return out
 
 
-def _leave_out_zero_bones(tree: SourceTree, digit: Digit) -> None:
-    """Leap's thumb has a metacarpal of no length."""
+def _drop_zero_bones(tree: SourceTree, digit: Digit) -> None:
+    """Drop first bones of zero length, such as the metacarpal of Leap's thumb."""
     at = tree.positions
     size = float(np.linalg.norm(np.ptp(at[digit.joints], axis=0))) or 1.0
     while len(digit.joints) > 3 and np.linalg.norm(at[digit.joints[1]] - at[digit.joints[0]]) < 1e-3 * size:
@@ -90,7 +90,7 @@ def _assign(name: str, digit: Digit, metacarpals: bool) -> dict[str, int]:
     names = [f"{name}.{joint}" for joint in FINGER_JOINTS]
     if name == "thumb":
         if len(chain) > 3 and ("thumb.tip" in roles or metacarpals):
-            chain = chain[-3:]  # a trapezium comes first
+            chain = chain[-3:]  # drop a leading trapezium
     elif len(chain) > 1 and (
         ranks[0] == 0 or len(chain) >= 5 or (len(chain) == 4 and (f"{name}.tip" in roles or metacarpals))
     ):
@@ -101,24 +101,24 @@ def _assign(name: str, digit: Digit, metacarpals: bool) -> dict[str, int]:
 
 
 def _fingers_begin_with_metacarpals(tree: SourceTree, hands: Sequence[HandDigits], flesh: JointFlesh) -> bool:
-    """Decide for all fingers whose four joints may be metacarpal to third knuckle, or base to tip.
+    """Decide for all fingers of four joints whether these are metacarpal to knuckle3 or base to tip.
 
-    Votes: how far their first joints are from the wrist, how much they spread, whether the last ones own flesh, and
-    whether the thumb has as many joints (then it has no metacarpal more than the fingers).
+    Votes: distance of their first joints from the wrist, spread of these, whether last joints own skin, and whether
+    the thumb has as many joints (then the fingers have no additional metacarpal).
     """
     ratios, spreads, last, thumbs = [], [], [], []
     for hand in hands:
-        open_ = {name: d.joints for name, d in hand.digits.items() if name != "thumb" and _is_open(d)}
-        for chain in open_.values():
+        ambiguous = {name: d.joints for name, d in hand.digits.items() if name != "thumb" and _is_ambiguous(d)}
+        for chain in ambiguous.values():
             first = np.linalg.norm(tree.positions[chain[1]] - tree.positions[chain[0]])
             if hand.wrist is not None and first > 0:
                 ratios.append(float(np.linalg.norm(tree.positions[chain[0]] - tree.positions[hand.wrist]) / first))
             if flesh.known:
                 last.append(float(flesh.shares[chain[-1]] / max(flesh.shares[chain[-2]], 1e-12)))
-        if len(open_) >= 3:
-            heads, second = (_spread(tree.positions[[chain[k] for chain in open_.values()]]) for k in (0, 1))
+        if len(ambiguous) >= 3:
+            heads, second = (_spread(tree.positions[[chain[k] for chain in ambiguous.values()]]) for k in (0, 1))
             spreads.append(heads / second if second > 0 else 1.0)
-        if open_ and "thumb" in hand.digits:
+        if ambiguous and "thumb" in hand.digits:
             thumb = hand.digits["thumb"]
             thumbs.append(len(thumb.joints) - (thumb.ranks[-1] == 4))
     votes = 0.0
@@ -136,8 +136,8 @@ def _fingers_begin_with_metacarpals(tree: SourceTree, hands: Sequence[HandDigits
     return votes > 0
 
 
-def _is_open(digit: Digit) -> bool:
-    """Whether neither names nor the count of joints say where a finger begins."""
+def _is_ambiguous(digit: Digit) -> bool:
+    """Whether neither names nor the number of joints determine a finger's first joint."""
     return len(digit.joints) == 4 and digit.ranks[0] != 0 and digit.ranks[-1] != 4
 
 

@@ -1,4 +1,4 @@
-"""What names propose without a body behind it: limbs of four-legged animals, arms of machines, fingers of no hand."""
+"""Rejection of false positives of recognition: limbs of animals, arms of machines, fingers of no hand."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["reject_unfounded"]
 
 _SEGMENTS = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
-_HANGS = -0.5  # cosine of legs to trunk below which a body stands upright
-_ALONGSIDE = 0.5  # cosine of arms to legs above which arms stand on the ground as well
+_HANGS = -0.5  # cosine between legs and trunk below which a body stands upright
+_ALONGSIDE = 0.5  # cosine between arms and legs above which arms stand on the ground, too
 _FINGERS = ("index", "middle", "ring", "pinky")
-_LONGEST_FINGER = 4.0  # per shortest
-_WIDEST = 3.0  # distance of two finger bases per mean length of the fingers
-_TOGETHER = 0.3  # length of the mean of the fingers' directions
+_LONGEST_FINGER = 4.0  # largest ratio of the longest finger to the shortest
+_WIDEST = 3.0  # largest distance of two finger bases, per mean length of the fingers
+_TOGETHER = 0.3  # smallest length of the mean of the fingers' unit directions
 
 
 def reject_unfounded(tree: SourceTree, roles: Roles, stated: Collection[str] = ()) -> None:
-    """Take out of ``roles`` what is neither hand nor body, though names or shape proposed it.
+    """Remove from ``roles`` hands and bodies that names or shape proposed but geometry contradicts.
 
-    Nothing is rejected where joints are ``stated`` by hand.
+    Nothing is rejected where the user ``stated`` joints.
     """
     if stated:
         return
@@ -36,16 +36,16 @@ def reject_unfounded(tree: SourceTree, roles: Roles, stated: Collection[str] = (
         words = ", ".join(f"'{tree.names[j]}'" for j in list(hand.joints.values())[:3])
         roles.notes.append(f"{words}{', …' if len(hand.joints) > 3 else ''}: named like fingers, but they form no hand")
     if roles.body and not roles.hands and not _is_body(tree, roles):
-        _forget_body(roles, of_body, doubts)
+        _remove_body(roles, of_body, doubts)
         roles.notes.append("some joints are named like limbs, but they form none: joints keep their names")
-    if roles.body and (_on_all_fours(tree, roles) or _many_legs(tree)):
-        _forget_body(roles, of_body, doubts)
+    if roles.body and (_on_all_fours(tree, roles) or _has_two_legs_on_a_side(tree)):
+        _remove_body(roles, of_body, doubts)
         roles.hands.clear()
         roles.notes.append("an animal's limbs, not an upright body's: joints keep their names")
 
 
-def _forget_body(roles: Roles, notes: int, doubts: int) -> None:
-    """Take the body out, and what was told of its limbs: the first ``notes`` and ``doubts``."""
+def _remove_body(roles: Roles, notes: int, doubts: int) -> None:
+    """Remove the body, and the notes on its limbs: the first ``notes`` and ``doubts``."""
     roles.body.clear()
     del roles.notes[:notes], roles.suspicious[:doubts]
 
@@ -55,7 +55,7 @@ def _is_hand(tree: SourceTree, hand: HandRoles) -> bool:
     chains = {d: [at[j] for name, j in hand.joints.items() if name.startswith(f"{d}.")] for d in (*_FINGERS, "thumb")}
     chains = {digit: chain for digit, chain in chains.items() if chain}
     if len(chains) < 2 or max(len(chain) for chain in chains.values()) < 2:
-        # one finger is a part of a hand where its side, too, is told
+        # a single finger counts as part of a hand if its name also states the side
         return hand.side is not None and max((len(chain) for chain in chains.values()), default=0) >= 2
     fingers = [chain for digit, chain in chains.items() if digit != "thumb" and len(chain) >= 2]
     if len(fingers) < 2:
@@ -78,25 +78,27 @@ def _heading(chain: list[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def _is_body(tree: SourceTree, roles: Roles) -> bool:
-    """A limb of two joints in one line, or a trunk with a head in one line."""
+    """Whether there is a limb of two joints in one chain, or a trunk with a head in one chain."""
     if tree.flat:
         return len(roles.body) > 2
     pairs = [(f"{side}.{a}", f"{side}.{b}") for side in ("left", "right") for a, b in _SEGMENTS]
-    if any(a in roles.body and b in roles.body and _below(tree, roles.body[a], roles.body[b]) for a, b in pairs):
+    if any(
+        a in roles.body and b in roles.body and _is_descendant(tree, roles.body[a], roles.body[b]) for a, b in pairs
+    ):
         return True
     trunk = [name for name in roles.body if name.startswith(("spine", "neck")) or name == "pelvis"]
     head = roles.body.get("head")
     if head is None:
         return len(trunk) >= 2
-    return any(_below(tree, roles.body[name], head) for name in trunk)
+    return any(_is_descendant(tree, roles.body[name], head) for name in trunk)
 
 
-def _below(tree: SourceTree, above: int, joint: int) -> bool:
+def _is_descendant(tree: SourceTree, above: int, joint: int) -> bool:
     return above in tree.ancestors(joint)
 
 
 def _on_all_fours(tree: SourceTree, roles: Roles) -> bool:
-    """Legs hang across the trunk, not along it; arms, where there are any, stand beside them."""
+    """Whether legs are not opposite to the trunk, and arms, if any, are parallel to the legs."""
     at, body = tree.positions, roles.body
     legs = _mean_direction(at, body, ("hip", "knee", "ankle"))
     top = next((body[name] for name in ("neck1", "head") if name in body), None)
@@ -121,8 +123,8 @@ def _mean_direction(
     return unit(mean) if np.linalg.norm(mean) > 1e-6 else None
 
 
-def _many_legs(tree: SourceTree) -> bool:
-    """Whether one side has two legs: lines of joints named so, of like length, neither below the other."""
+def _has_two_legs_on_a_side(tree: SourceTree) -> bool:
+    """Whether one side has two legs: chains named as legs, of similar length, neither a descendant of the other."""
     for side in ("left", "right"):
         legs = [j for j, name in enumerate(tree.names) if _is_leg(name, side)]
         heads = [j for j in legs if not set(tree.ancestors(j)) & set(legs)]

@@ -1,8 +1,8 @@
-"""Where joints are expected along limb, finger and spine, and beside their mirror images (R14).
+"""Expected positions of joints along limbs, fingers and spine, and mirrored from the other side (R14).
 
-One criterion: a joint lies where like joints of the same body lie, so far as bodies are alike. For fingers these are
-the other fingers of the hand (bones of one hand share their style), for limbs the other side and the two halves of the
-limb, for the spine its neighbours and the midline. The deviation allowed is the larger of what rigs of others show.
+One criterion: a joint lies where comparable joints of the same body lie. For fingers these are the other fingers of the
+hand, for limbs the other side and the two halves of the limb, for the spine its neighbours and the midline. Tolerances
+are the largest deviations found in existing rigs.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ _PHALANGES = {
     "pinky": (32.7, 18.1, 14.5),
 }
 _TO_BASE = {"index": 98.0, "middle": 95.0, "ring": 89.0, "pinky": 84.0}
-_ALONG = 0.045  # of the palm's length: by which joints of four fingers differ in share from one another
-_THUMB = (0.51, 0.65)  # of the way between its neighbours, second and third joint, as rigs of others have them
-_THUMB_ALONG = 0.08  # of both bones' length: as `_ALONG`, for thumbs
+_ALONG = 0.045  # tolerance for a finger's joint against the other fingers, per length of the palm
+_THUMB = (0.51, 0.65)  # usual place of second and third joint between their neighbours, as a share
+_THUMB_ALONG = 0.08  # tolerance for thumbs, per length of both bones
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
-_HALVES = 1.32  # longer per shorter half of a limb: 1.02 to 1.13 are usual, knees a tenth of the leg off give 1.4
-_ASIDE = 0.012  # of the height: off the midline, or off where the other side's joint is
-_HAND_ASIDE = 0.0035  # likewise in hands and feet, whose joints lie closer together
-_ALIKE = 0.004  # of the height: median difference of the sides up to which a rest pose is symmetric
-_CLEARLY = 1.25  # by which one side is the odder one
+_HALVES = 1.32  # largest ratio of a limb's halves: 1.02 to 1.13 are usual, knees a tenth of the leg off give 1.4
+_ASIDE = 0.012  # tolerance from the midline, or from the mirror image, per height of the body
+_HAND_ASIDE = 0.0035  # likewise in hands and feet, whose joints are closer together
+_ALIKE = 0.004  # largest median asymmetry of a symmetric rest pose, per height of the body
+_CLEARLY = 1.25  # ratio of oddities at which one side is clearly the wrong one
 _USUAL = {"hip": (0.055, 0.53), "shoulder": (0.1, 0.8)}
-"""From the midline and from the floor, shares of the height (Drillis, Contini 1966)."""
-_BETWEEN = (0.27, 0.70)  # of the way between its neighbours: where a joint of the spine lies
-_MIDDLE = 0.48  # of the way from the joint below to the one above, where one is proposed
+"""Distances from the midline and from the floor, per height of the body (Drillis, Contini 1966)."""
+_BETWEEN = (0.27, 0.70)  # range of a spine joint's place between its neighbours, as a share
+_MIDDLE = 0.48  # its proposed place, from the joint below to the one above
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ class Expectation:
     Attributes:
         joint: Its name.
         kind: ``proportion``, ``asymmetric`` or ``midline``.
-        place: Where it is expected [m], shape (3,).
-        amount: How far off [m].
-        detail: By what, for people.
+        place: Expected position [m], shape (3,).
+        amount: Distance from it [m].
+        detail: Description of the deviation for the user.
     """
 
     joint: str
@@ -65,7 +65,7 @@ class Expectation:
 
 
 def finger_expectations(joints: Joints) -> list[Expectation]:
-    """Knuckles whose share of their finger, or of the palm, differs from those of the other fingers."""
+    """Finger joints whose relative position differs from that of the other fingers."""
     out = []
     for side in ("left.", "right.", ""):
         chains = {
@@ -102,7 +102,7 @@ def finger_expectations(joints: Joints) -> list[Expectation]:
 
 
 def _thumb(side: str, joints: Joints) -> list[Expectation]:
-    """A thumb has no neighbour like it: each joint between its own neighbours, the worse of two."""
+    """A thumb has no comparable neighbour: each joint is compared with its own neighbours; the worse of two."""
     names = [f"{side}thumb.{joint}" for joint in FINGER_JOINTS]
     if not all(name in joints for name in names):
         return []
@@ -115,7 +115,7 @@ def _thumb(side: str, joints: Joints) -> list[Expectation]:
             way = unit(before - at) if off > 0 else unit(after - at)
             detail = f"{1e3 * first:.1f} mm before it, {1e3 * second:.1f} behind"
             found.append(Expectation(names[k], "proportion", at + abs(off) * way, abs(off), detail))
-    return sorted(found, key=lambda one: -one.amount)[:1]
+    return sorted(found, key=lambda expectation: -expectation.amount)[:1]
 
 
 def _knuckles(side: str, chains: Mapping[str, list[Array]], palm: float) -> list[Expectation]:
@@ -152,22 +152,22 @@ def _knuckles(side: str, chains: Mapping[str, list[Array]], palm: float) -> list
 def body_expectations(
     joints: Joints, up: Array, height: float, floor: float, uneven: Callable[[Array], float]
 ) -> list[Expectation]:
-    """Joints of trunk and limbs that proportions, midline or the other side put elsewhere.
+    """Joints of trunk and limbs that deviate from proportions, the midline or the other side.
 
     Args:
         joints: Canonical joints → positions [m].
-        up: The body's up, unit vector.
-        height: Of its surface along it [m].
-        floor: Lowest place along it [m].
-        uneven: How unlike the flesh on opposite sides of a place is, from 0 to 1.
+        up: The body's up direction, unit vector.
+        height: Height of its surface along ``up`` [m].
+        floor: Lowest coordinate of its surface along ``up`` [m].
+        uneven: Asymmetry of the flesh around a place, from 0 to 1.
     """
     pairs = {name[5:]: (place, joints[f"right.{name[5:]}"]) for name, place in joints.items() if _paired(name, joints)}
     if len(pairs) < 4:
         return []
-    left, middle, alike = _midplane(pairs, height)
+    left, middle, alike = _sagittal_plane(pairs, height)
     out = _limbs(joints)
     out += _spine(joints, up, height, left, middle)
-    named = {one.joint for one in out}
+    named = {expectation.joint for expectation in out}
     if not alike:
         return out
     for name, (a, b) in pairs.items():
@@ -181,7 +181,7 @@ def body_expectations(
             for side, place in (("left", a), ("right", b))
         }
         ratio = odd["left"] / max(odd["right"], 1e-9)
-        # where neither is clearly the odd one, both are named
+        # where neither side is clearly the wrong one, both are reported
         doubted = [side for side, r in (("left", ratio), ("right", 1.0 / max(ratio, 1e-9))) if r > 1.0 / _CLEARLY]
         for side in doubted:
             place = mirrored if side == "left" else a - 2.0 * float((a - middle) @ left) * left
@@ -195,8 +195,8 @@ def _paired(name: str, joints: Joints) -> bool:
     return name.startswith("left.") and f"right.{name[5:]}" in joints
 
 
-def _midplane(pairs: Mapping[str, tuple[Array, Array]], height: float) -> tuple[Array, Array, bool]:
-    """Unit normal to the left, a point of the plane between the sides, and whether they are mirror images."""
+def _sagittal_plane(pairs: Mapping[str, tuple[Array, Array]], height: float) -> tuple[Array, Array, bool]:
+    """Normal of the sagittal plane (unit, to the left), a point of it, and whether the sides are mirror images."""
     a = np.array([pair[0] for pair in pairs.values()])
     b = np.array([pair[1] for pair in pairs.values()])
     good = np.ones(len(a), dtype=bool)
@@ -220,7 +220,7 @@ def _oddity(
     height: float,
     floor: float,
 ) -> float:
-    """How unusual one of two mirror images is: by proportions, or by how its bones differ in length from straight."""
+    """How unusual a joint's position is: by body proportions, or by length differences and bends of its bones."""
     if name in _USUAL:
         aside, high = _USUAL[name]
         return float(np.hypot(abs((place - middle) @ left) / height - aside, ((place @ up) - floor) / height - high))
@@ -259,7 +259,7 @@ def _limbs(joints: Joints) -> list[Expectation]:
             upper, lower = float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b))
             if min(upper, lower) <= 0.0 or max(upper, lower) < _HALVES * min(upper, lower):
                 continue
-            # the joint goes along the longer half until both are alike
+            # the joint moves along the longer half until both are equal
             off = abs(upper - lower) / 2
             place = b + off * (unit(a - b) if upper > lower else unit(c - b))
             parts = ("thigh", "shin") if first == "hip" else ("upper arm", "forearm")
@@ -277,7 +277,7 @@ def _limbs(joints: Joints) -> list[Expectation]:
 
 def _spine(joints: Joints, up: Array, height: float, left: Array, middle: Array) -> list[Expectation]:
     names = [n for n in ("pelvis", *sorted(n for n in joints if n.startswith("spine"))) if n in joints]
-    # a neck of several joints has its own, closer steps: the first of them ends the spine's
+    # joints of a neck with several are closer together: only the first of them ends the spine's sequence
     necks = sorted(n for n in joints if n.startswith("neck"))
     names += [n for n in ((*necks, "head") if len(necks) == 1 else (*necks[:1], "head")[:1]) if n in joints]
     places = {name: joints[name] for name in names}
@@ -291,10 +291,10 @@ def _spine(joints: Joints, up: Array, height: float, left: Array, middle: Array)
                 Expectation(name, "midline", place, abs(aside), f"{1e3 * abs(aside):.0f} mm off the body's midline")
             )
     while True:
-        wrong = _out_of_row(names, places, up)
+        wrong = _misplaced_along_spine(names, places, up)
         if not wrong:
             return out
-        tried = {name: len(_out_of_row(names, {**places, name: place}, up)) for name, place in wrong.items()}
+        tried = {name: len(_misplaced_along_spine(names, {**places, name: place}, up)) for name, place in wrong.items()}
         name = min(tried, key=lambda n: (tried[n], -float(np.linalg.norm(places[n] - wrong[n]))))
         off = float(np.linalg.norm(joints[name] - wrong[name]))
         places[name] = wrong[name]
@@ -303,8 +303,8 @@ def _spine(joints: Joints, up: Array, height: float, left: Array, middle: Array)
             return out
 
 
-def _out_of_row(names: list[str], places: Joints, up: Array) -> dict[str, Array]:
-    """Joints of the spine that are not about half-way between their neighbours, and where they are expected."""
+def _misplaced_along_spine(names: list[str], places: Joints, up: Array) -> dict[str, Array]:
+    """Joints of the spine that are not about half-way between their neighbours, and their expected positions."""
     out = {}
     for below, name, above in zip(names, names[1:], names[2:], strict=False):
         low, here, high = (float(places[n] @ up) for n in (below, name, above))

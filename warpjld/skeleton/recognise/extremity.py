@@ -1,4 +1,4 @@
-"""Where a chain ends inside the flesh: the centre of the extremity (B §2.1, R13)."""
+"""End point of a chain inside the flesh: the centre of the extremity (B §2.1, R13)."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ def find_extremity(
     direction: NDArray[np.float64],
     expected: float,
 ) -> NDArray[np.float64] | None:
-    """Centre of the rounded end that a last segment points into.
+    """Centre of the rounded end that a last segment points to.
 
-    The surface is followed along the segment's line to where the line leaves it; the centre lies one local radius
-    (the pad's) before that, in the middle of the cross-section.
+    The line along the segment is followed to where it leaves the surface; the centre lies one local radius (the pad's)
+    before that, in the middle of the cross-section.
 
     Args:
         vertices: Surface [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
         start: The last joint [m].
         direction: Unit direction of its bone.
-        expected: Plausible length of the segment [m]: a surface met much further off is another one.
+        expected: Plausible length of the segment [m]: surface met much further away belongs to something else.
 
     Returns:
         The point, or None where the line does not leave the surface within reach.
     """
-    # along the line and on slightly splayed ones: the last joint may be off-centre or its bone a bit crooked
+    # if the line misses, take the furthest vertex near it: the last joint may be off-centre or its bone skewed
     length = first_hits(vertices, faces, start[None], direction[None])[0]
     if not np.isfinite(length) or length > 3.0 * expected:
         near = vertices - start

@@ -1,4 +1,4 @@
-"""Parts of hands that names leave out, where the tree's shape leaves no doubt: metacarpals, and all digits."""
+"""Hand joints that names leave out, inferred from the tree's shape: metacarpals and whole digits."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ __all__ = ["fill_hands"]
 
 
 def fill_hands(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str] = ()) -> None:
-    """Add to ``roles`` the digits that names leave out, and metacarpals with other names."""
+    """Add digits without understood names, and metacarpals with other names, to ``roles``."""
     if tree.flat:
         return
     if not any(name.partition(".")[2] in HAND_PARENTS for name in stated):
-        _digits(tree, roles, flesh)
+        _fill_digits(tree, roles, flesh)
     for hand in roles.hands:
-        _metacarpals(tree, roles, hand, flesh, stated)
+        _fill_metacarpals(tree, roles, hand, flesh, stated)
 
 
-def _digits(tree: SourceTree, roles: Roles, flesh: JointFlesh) -> None:
+def _fill_digits(tree: SourceTree, roles: Roles, flesh: JointFlesh) -> None:
     wrists = {joint: name for name, joint in roles.body.items() if name.endswith(".wrist")}
-    partial = {hand.joints["wrist"]: hand for hand in roles.hands if "wrist" in hand.joints and not _whole(hand)}
+    partial = {hand.joints["wrist"]: hand for hand in roles.hands if "wrist" in hand.joints and not _is_complete(hand)}
     if not wrists and not partial:
         return
     for hand in hands_by_shape(tree, flesh):
-        if (named := partial.get(hand.joints["wrist"])) is not None and not _elsewhere(hand, named, roles):
-            _complete(tree, roles, named, hand)
+        if (named := partial.get(hand.joints["wrist"])) is not None and not _has_other_role(hand, named, roles):
+            _complete_by_shape(tree, roles, named, hand)
             continue
         name = wrists.get(hand.joints["wrist"])
         if name is not None and not set(hand.joints.values()) - {hand.joints["wrist"]} & set(roles.body.values()):
@@ -41,18 +41,18 @@ def _digits(tree: SourceTree, roles: Roles, flesh: JointFlesh) -> None:
             roles.notes.append(f"{side} hand: fingers below '{tree.names[hand.joints['wrist']]}' by their shape")
 
 
-def _whole(hand: HandRoles) -> bool:
+def _is_complete(hand: HandRoles) -> bool:
     return all(f"{digit}.base" in hand.joints for digit in DIGITS)
 
 
-def _elsewhere(hand: HandRoles, named: HandRoles, roles: Roles) -> bool:
-    """Whether a joint of a hand plays another part already."""
+def _has_other_role(hand: HandRoles, named: HandRoles, roles: Roles) -> bool:
+    """Whether a joint of a hand has another role already."""
     others = {joint for other in roles.hands if other is not named for joint in other.joints.values()}
     return bool((set(hand.joints.values()) - {hand.joints["wrist"]}) & (others | set(roles.body.values())))
 
 
-def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRoles) -> None:
-    """Digits of a hand in whose words only some were understood ("Ringfinger" beside "Daumen")."""
+def _complete_by_shape(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRoles) -> None:
+    """Take all digits by shape where names are only partly understood ("Ringfinger" beside "Daumen")."""
     understood = {name.partition(".")[0] for name in named.joints} - {"wrist"}
     moved = {
         digit
@@ -72,8 +72,10 @@ def _complete(tree: SourceTree, roles: Roles, named: HandRoles, shaped: HandRole
         )
 
 
-def _metacarpals(tree: SourceTree, roles: Roles, hand: HandRoles, flesh: JointFlesh, stated: Collection[str]) -> None:
-    """The joint between wrist and one finger's base that leads to nothing else."""
+def _fill_metacarpals(
+    tree: SourceTree, roles: Roles, hand: HandRoles, flesh: JointFlesh, stated: Collection[str]
+) -> None:
+    """Set a metacarpal to the joint between wrist and a finger's base that has no other child."""
     taken = set(hand.joints.values()) | set(roles.body.values())
     for digit in DIGITS:
         name, base = f"{digit}.carpometacarpal", hand.joints.get(f"{digit}.base")

@@ -1,4 +1,4 @@
-"""Which joints own flesh: skin tells joints that move a body from helpers, ends, sockets and controls."""
+"""Skin owned by each joint: distinguishes joints that move a body from helpers, ends, sockets and controls."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["JointFlesh", "flesh_shares", "without_flesh"]
 
-_NONE = 1e-6  # share of the surface below which a joint owns nothing
-_COINCIDENT = 1e-3  # of the bone before: an end nearer than this is no end
-_LONGEST_END, _MOST_TURNED = 2.5, np.cos(np.radians(75.0))  # of the bone before; from its direction
+_NONE = 1e-6  # share of the surface up to which a joint owns no skin
+_COINCIDENT = 1e-3  # an end nearer than this, per length of the bone before, coincides with its joint
+_LONGEST_END, _MOST_TURNED = 2.5, np.cos(np.radians(75.0))  # per length of the bone before; cosine to its direction
 
 
 def flesh_shares(
@@ -27,13 +27,13 @@ def flesh_shares(
     weights: NDArray[np.float64] | None,
     rigid: NDArray[np.int64] | None = None,
 ) -> NDArray[np.float64] | None:
-    """Share of the surface's vertices that each of ``count`` joints moves, shape (N,); None where no skin is painted.
+    """Share of the surface's vertices that each of ``count`` joints moves, shape (N,); None without painted weights.
 
     Args:
-        count: Joints of the file.
+        count: Number of joints of the file.
         joints: Influencing joints per vertex, shape (W, K).
         weights: Their weights, shape (W, K).
-        rigid: Joint that a vertex follows rigidly, -1 for flesh, shape (W,).
+        rigid: Joint that a vertex follows rigidly, -1 for deformable vertices, shape (W,).
     """
     if joints is None or weights is None or not len(joints):
         return None
@@ -45,28 +45,28 @@ def flesh_shares(
 
 
 class JointFlesh:
-    """The flesh of a joint tree.
+    """Skin ownership in a joint tree.
 
     Args:
         tree: The file's joints.
-        shares: As from :func:`flesh_shares`; None where no skin says anything: then no joint is bare.
+        shares: As from :func:`flesh_shares`; None without painted weights: then every joint counts as owning skin.
     """
 
     def __init__(self, tree: SourceTree, shares: NDArray[np.float64] | None) -> None:
         self._tree = tree
         self.known = shares is not None and bool((shares > _NONE).any())
-        """Whether the file has a skin that tells."""
+        """Whether the file has painted weights."""
         self.shares: NDArray[np.float64] = shares if shares is not None and self.known else np.ones(len(tree))
-        """Share of the surface that each joint moves, shape (N,); ones where nothing is known."""
+        """Share of the surface that each joint moves, shape (N,); ones without painted weights."""
 
     @property
     def bare(self) -> NDArray[np.bool_]:
-        """Joints that move no skin themselves, shape (N,)."""
+        """Joints that own no skin, shape (N,)."""
         return self.shares <= _NONE
 
     @cached_property
     def live(self) -> NDArray[np.bool_]:
-        """Joints with flesh of their own or below, shape (N,)."""
+        """Joints that own skin or have a descendant that does, shape (N,)."""
         live = ~self.bare
         for j in np.flatnonzero(live):
             live[self._tree.ancestors(int(j))] = True
@@ -74,11 +74,11 @@ class JointFlesh:
 
     @cached_property
     def ends(self) -> dict[int, int]:
-        """The joint, without flesh, at which the flesh of a last joint ends → that last joint.
+        """End joint without skin → the last joint with skin, whose bone it ends.
 
-        Of several the one with a name of its own (``index_tip``, not ``index_03_helper`` below ``index_03``), then the
-        one whose name says so, the shortest (not ``tip_end`` below ``tip``), then the furthest on; sockets aside and
-        targets far off are none.
+        Of several candidates: one whose name does not extend the joint's (``index_tip``, not ``index_03_helper`` below
+        ``index_03``), then one named as an end, with the shortest name (not ``tip_end`` below ``tip``), then the
+        furthest along the bone. Sockets to the side and distant targets are excluded.
         """
         tree, out = self._tree, {}
         if not self.known or tree.flat:
@@ -92,7 +92,7 @@ class JointFlesh:
         return out
 
     def _end_score(self, joint: int, end: int) -> tuple[float, ...]:
-        """The larger the likelier does ``end`` end the bone of ``joint``; empty where it does not."""
+        """Score of ``end`` as the end of ``joint``'s bone, larger is likelier; empty if it is none."""
         at, above = self._tree.positions, int(self._tree.parents[joint])
         bone = at[end] - at[joint]
         before = at[joint] - at[above] if above >= 0 else bone
@@ -109,9 +109,9 @@ class JointFlesh:
 
     @cached_property
     def dead(self) -> NDArray[np.bool_]:
-        """Joints that neither move skin, themselves or by others, nor end a bone that does, shape (N,).
+        """Joints that neither own skin, nor have descendants that do, nor end a bone, shape (N,).
 
-        Nothing is dead in a hierarchy that says nothing.
+        None in a flat file or without painted weights.
         """
         if not self.known or self._tree.flat:
             return np.zeros(len(self._tree), dtype=bool)
@@ -121,14 +121,14 @@ class JointFlesh:
 
     @cached_property
     def passing(self) -> NDArray[np.bool_]:
-        """Joints without flesh through which one chain of live joints, and nothing else, goes on, shape (N,)."""
+        """Joints without skin that have exactly one child with skin at or below it, shape (N,)."""
         if not self.known or self._tree.flat:
             return np.zeros(len(self._tree), dtype=bool)
         lines = np.array([sum(bool(self.live[c]) for c in kids) == 1 for kids in self._tree.children])
         return self.bare & lines
 
     def on_the_way(self, joint: int) -> bool:
-        """Whether a passing joint lies where its neighbours are, or on the line between them."""
+        """Whether a passing joint coincides with a neighbour or lies on the line between its neighbours."""
         tree = self._tree
         above = int(tree.parents[joint])
         below = next(c for c in tree.children[joint] if self.live[c])
@@ -147,14 +147,14 @@ _MOVES_SKIN = ("hip", "knee", "shoulder", "elbow", "knuckle2", "knuckle3")
 def without_flesh(
     tree: SourceTree, names: Sequence[str], sources: Sequence[int], owner: NDArray[np.int64], flesh: JointFlesh
 ) -> list[str]:
-    """Doubts about recognised joints that move no skin in the file, nor do those merged into them.
+    """Warnings about recognised joints that own no skin in the file, including joints merged into them.
 
     Args:
         tree: The file's joints.
         names: Canonical joints.
-        sources: Joint of the file that each one is, -1 for added ones.
+        sources: Joint of the file for each canonical joint, -1 for added ones.
         owner: Canonical joint of every joint of the file, shape (N,).
-        flesh: The file's skin.
+        flesh: Skin ownership in the file.
     """
     if not flesh.known:
         return []

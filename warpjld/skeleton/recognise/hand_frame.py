@@ -1,4 +1,4 @@
-"""A hand's own directions, and which hand it is, from where its joints lie."""
+"""Frame of a hand (forward, radial, dorsal) and its chirality, from joint positions."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class HandFrame:
 
     Attributes:
         forward: From the wrist to the knuckles.
-        radial: To the thumb's side, perpendicular to ``forward``.
-        dorsal: Out of the back of the hand.
+        radial: Towards the thumb, perpendicular to ``forward``.
+        dorsal: Outwards from the back of the hand.
     """
 
     forward: NDArray[np.float64]
@@ -37,9 +37,9 @@ def hand_frame(points: Points, side: str) -> HandFrame:
 
 
 def chirality(points: Points) -> float:
-    """Positive for a right hand, negative for a left one; near zero where rest pose and thumb do not tell.
+    """Positive for a right hand, negative for a left one; near zero where the rest pose is ambiguous.
 
-    Fingers bend to the palm, and the thumb lies before it: both say which side of the palm's plane is dorsal.
+    Fingers bend towards the palm, and the thumb lies in front of it: both tell the palmar from the dorsal side.
     """
     _, _, normal = _palm(points)
     bases = [points[f"{d}.base"] for d in ("index", "middle", "ring", "pinky") if f"{d}.base" in points]

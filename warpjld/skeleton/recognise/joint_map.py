@@ -1,4 +1,4 @@
-"""Joints stated by hand: canonical joints → the file's own, which win over names and geometry."""
+"""Joint maps: user-stated pairs of canonical joint and file joint, which override names and geometry."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _IGNORE = "ignore"
 
 
 def is_canonical(name: str) -> bool:
-    """Whether a map may state this joint: ``left.knee``, ``spine2``, ``right.index.base``, or ``index.base``."""
+    """Whether a joint map may contain this key: ``left.knee``, ``spine2``, ``right.index.base``, or ``index.base``."""
     return name in _KNOWN or _TRUNK.fullmatch(name) is not None
 
 
 def check_stated(stated: Mapping[str, Any]) -> None:
-    """Check what a map states, whatever the file.
+    """Check a joint map independently of any file.
 
     Raises:
         InputError: An unknown canonical joint, or a value that is no name.
@@ -53,16 +53,16 @@ def check_stated(stated: Mapping[str, Any]) -> None:
 
 
 class JointMap:
-    """What a map states of one file.
+    """A joint map resolved for one file.
 
     Args:
         tree: The file's joints.
         stated: Canonical name → name of a joint of the file; None: the file has no such joint. The key ``ignore``
-            may hold a list of the file's joints that are to be no joints of their own. Of joints of the same name
-            ``name#2`` is the second. The side of a single hand may be left out.
+            may hold a list of the file's joints that are not to be kept as joints. ``name#2`` is the second joint of
+            that name. The side of a single hand may be left out.
 
     Raises:
-        InputError: A name that is not known, or given twice.
+        InputError: An unknown name, or one that is given twice.
     """
 
     def __init__(self, tree: SourceTree, stated: Mapping[str, Any]) -> None:
@@ -77,18 +77,18 @@ class JointMap:
                 raise InputError(f"joint map: '{value}' is given for both {twice} and {name}")
             self._joints[name] = joint
         self.ignored = {_find(tree, name) for name in stated.get(_IGNORE, [])}
-        """Joints of the file that are to be no joints of their own."""
+        """Joints of the file that are not to be kept as joints."""
         both = next((n for n, j in self._joints.items() if j in self.ignored), None)
         if both is not None:
             raise InputError(f"joint map: the joint of {both} is to be ignored, too")
 
     @property
     def names(self) -> frozenset[str]:
-        """Canonical names that are stated, also those that the file is said not to have."""
+        """Canonical names in the map, including those stated as missing."""
         return frozenset(self._joints)
 
     def apply(self, roles: Roles) -> None:
-        """Bring what is stated into ``roles``, in place of what was found."""
+        """Set the stated joints in ``roles``, replacing what was found."""
         taken = {j for j in self._joints.values() if j is not None} | self.ignored
         for table in (roles.body, *(hand.joints for hand in roles.hands)):
             for name in [name for name, joint in table.items() if joint in taken]:
@@ -102,7 +102,7 @@ class JointMap:
 
 
 def _table(roles: Roles, name: str) -> tuple[dict[str, int], str]:
-    """Where a canonical joint is kept in ``roles``, and under which name."""
+    """The table of ``roles`` that holds a canonical joint, and its key there."""
     side, _, short = name.partition(".") if name.startswith(("left.", "right.")) else ("", "", name)
     if short not in HAND_PARENTS:
         return roles.body, name

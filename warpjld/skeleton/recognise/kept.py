@@ -1,4 +1,4 @@
-"""Joints that were not recognised: those that stay joints of their own, and those that belong to another."""
+"""Treatment of joints that were not recognised: kept under their own names, or merged into a recognised joint."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from warpjld.skeleton.recognise.tree import SourceTree
 __all__ = ["kept_joints", "lies_on_bone"]
 
 _LIMBS = ("clavicle", "shoulder", "elbow", "hip", "knee")
-_STRAIGHT = np.cos(np.radians(25.0))  # cosine of the bend at rest up to which a limb's parts are one bone
-_CHAIN = 2  # joints with flesh that make a digit of their own
-_HAIR = 0.08  # of the skeleton's size: reach of a chain that is hair, or horns, and no part of a face
-_ASIDE = 0.03  # of a bone's length: a joint nearer to it lies on it
+_STRAIGHT = np.cos(np.radians(25.0))  # cosine of the largest rest bend at which a limb's parts count as one bone
+_CHAIN = 2  # smallest number of joints with skin that form a digit of their own
+_HAIR = 0.08  # smallest reach of a chain below the head that is hair or horns, per size of the skeleton
+_ASIDE = 0.03  # largest distance, per length of the bone, at which a joint lies on it
 
 
 def kept_joints(
     tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, left_out: Collection[int], notes: list[str]
 ) -> dict[int, str]:
-    """Joints of the file that stay joints, with their names in lower case.
+    """Unrecognised joints of the file that are kept, with their names in lower case.
 
     Args:
         tree: The file's joints.
         of_source: Recognised joints → canonical names.
         flesh: Which joints own skin.
-        left_out: Joints that the user wants to be none.
-        notes: What was merged and what was kept is added here.
+        left_out: Joints that the user excluded.
+        notes: Notes on merged and kept joints are appended.
     """
     size = float(np.linalg.norm(np.ptp(tree.positions, axis=0))) or 1.0
     kept: dict[int, str] = {}
@@ -40,16 +40,16 @@ def kept_joints(
             continue
         over = [of_source[k] for k in tree.ancestors(j) if k in of_source]
         below = [of_source[k] for k in tree.subtree(j) if k in of_source]
-        part = of_source and _belongs(tree, j, over, below, size) and not _bends(tree, of_source, flesh, j)
+        part = of_source and _is_part(tree, j, over, below, size) and not _bends_limb(tree, of_source, flesh, j)
         part = part and not _chain_of_its_own(tree, of_source, flesh, j)
-        if j in left_out or _moves_nothing(tree, flesh, j) or part:
+        if j in left_out or _is_inert(tree, flesh, j) or part:
             into = over[0] if over else (below[0] if below else "the joint above")
             merged.setdefault(into, []).append(tree.names[j])
         elif of_source and over and over[0].rpartition(".")[2] in _LIMBS and lies_on_bone(tree, j):
             merged.setdefault(over[0], []).append(tree.names[j])
         else:
             kept[j] = _own_name(tree, j)
-    if not kept and not of_source:  # nothing is left to stand on
+    if not kept and not of_source:  # otherwise the skeleton would be empty
         kept = {j: _own_name(tree, j) for j in range(len(tree))}
         merged.clear()
     if merged:
@@ -63,15 +63,15 @@ def kept_joints(
     return kept
 
 
-def _moves_nothing(tree: SourceTree, flesh: JointFlesh, joint: int) -> bool:
-    """Whether a joint neither moves skin nor ends a bone nor is where live chains part."""
+def _is_inert(tree: SourceTree, flesh: JointFlesh, joint: int) -> bool:
+    """Whether a joint neither moves skin, nor ends a bone, nor is a branching point of joints with skin."""
     if tree.flat:
         return flesh.known and bool(flesh.bare[joint])
     return bool(flesh.dead[joint] or flesh.passing[joint])
 
 
-def _belongs(tree: SourceTree, joint: int, over: list[str], below: list[str], size: float) -> bool:
-    """Whether an unrecognised joint is a part of a recognised one."""
+def _is_part(tree: SourceTree, joint: int, over: list[str], below: list[str], size: float) -> bool:
+    """Whether an unrecognised joint belongs to a recognised one."""
     beside = [k for k in range(len(tree)) if tree.parents[k] == tree.parents[joint] and k != joint]
     near = [tree.parents[joint], *beside]
     double = not tree.children[joint] and any(
@@ -82,8 +82,8 @@ def _belongs(tree: SourceTree, joint: int, over: list[str], below: list[str], si
     return bool(below) or helper or double or in_hand or "head" in over or (not over and tree.flat)
 
 
-def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
-    """Whether a joint with flesh of its own bends a limb between two recognised joints, as an animal's hock does."""
+def _bends_limb(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
+    """Whether a joint with skin bends a limb between two recognised joints, as an animal's hock does."""
     over = next((k for k in tree.ancestors(joint) if k in of_source), None)
     below = next((k for k in tree.subtree(joint) if k in of_source), None)
     if over is None or below is None or of_source[over].rpartition(".")[2] not in _LIMBS[1:]:
@@ -97,8 +97,8 @@ def _bends(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, jo
 
 
 def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
-    """Whether a joint is of a chain with flesh that leaves a wrist beside the known digits, as a sixth finger does, or
-    hangs far down from a head, as hair does."""
+    """Whether a joint belongs to a chain with skin that leaves the wrist beside the known digits (a sixth finger), or
+    hangs far down from the head (hair)."""
     if tree.flat or not flesh.known or flesh.dead[joint]:
         return False
     line = [joint]
@@ -110,9 +110,9 @@ def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: Joi
     chain = [j for j in tree.subtree(line[-1]) if not flesh.dead[j]]
     fleshy = [j for j in chain if not flesh.bare[j]]
     if any(sum(not flesh.dead[c] for c in tree.children[j]) > 1 for j in chain):
-        return False  # a face, or what is held
+        return False  # a face, or a held object
     helper = any(read_name(tree.names[j]).kind in ("helper", "palm") for j in chain)
-    if word == "head":  # jaw and tongue are the head's
+    if word == "head":  # short chains such as jaw and tongue belong to the head
         reach = max(float(np.linalg.norm(tree.positions[j] - tree.positions[above])) for j in chain)
         if reach < _HAIR * float(np.linalg.norm(np.ptp(tree.positions, axis=0))):
             return False
@@ -120,7 +120,7 @@ def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: Joi
 
 
 def lies_on_bone(tree: SourceTree, joint: int) -> bool:
-    """Whether a leaf lies on the bone from its parent to one of its siblings: it twists flesh, but bends none."""
+    """Whether a leaf lies on the bone from its parent to a sibling: a twist joint, which does not bend the limb."""
     parent = int(tree.parents[joint])
     if parent < 0 or tree.children[joint]:
         return False

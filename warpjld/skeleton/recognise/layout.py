@@ -1,4 +1,4 @@
-"""From roles to a canonical joint list: parents first, every joint of the file owned by one canonical joint."""
+"""Layout of the canonical joint list: parents first, every joint of the file assigned to one canonical joint."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Layout:
 
     Attributes:
         names: Canonical names.
-        parents: Their parents, -1 for the root.
-        sources: Joint of the file each one is, -1 for added ones.
+        parents: Parent indices, -1 for the root.
+        sources: Joint of the file for each canonical joint, -1 for added ones.
         positions: Rest positions.
         owner: Canonical joint that each joint of the file belongs to, shape (N,).
-        notes: What was merged or kept as it is.
+        notes: Joints that were merged or kept.
     """
 
     names: list[str]
@@ -62,19 +62,19 @@ def lay_out(
     hand_points: Mapping[str, Mapping[str, NDArray[np.float64]]],
     flesh: JointFlesh | None = None,
 ) -> Layout:
-    """Arrange recognised and remaining joints.
+    """Order recognised and remaining joints, and assign the file's joints to them.
 
-    Limbs are single segments: twist bones, and joints that divide a limb or lie between two recognised ones, belong
-    to the recognised joint above them, with their weights. JLD spreads a twist along a segment by itself, and a
-    bisector plane in the middle of a limb would only add a crease. Face bones belong to the head. Joints without flesh
-    (helpers, sockets, targets) belong to the joint above them. What else was not recognised keeps its name, in lower
+    Limbs are single segments: twist bones, and joints that subdivide a limb or lie between two recognised ones, belong
+    to the recognised joint above them, with their weights. JLD distributes a twist along a segment, and a bisector
+    plane in the middle of a limb would only add a crease. Face bones belong to the head. Joints without skin (helpers,
+    sockets, targets) belong to the joint above them. All other unrecognised joints are kept, with their names in lower
     case.
 
     Args:
         tree: The file's joints.
-        roles: What was recognised; every hand has a side.
+        roles: Recognised joints; every hand has a side.
         hand_points: Per side, positions of its 25 joints, names without the side.
-        flesh: Which joints own skin; None where no skin tells.
+        flesh: Which joints own skin; None without painted weights.
     """
     named = dict(roles.body)
     for hand in roles.hands:
@@ -92,7 +92,7 @@ def lay_out(
     for name, joint in named.items():
         if name not in in_hands or name.endswith(".wrist"):
             parent = next((of_source[j] for j in tree.ancestors(joint) if j in of_source), None)
-            if parent is None or tree.flat:  # where all hang on the pelvis, that says as little as no hierarchy
+            if parent is None or tree.flat:  # a flat file's parents carry no information
                 parent = _fallback(name, named)
             above[name] = parent
     for side, points in hand_points.items():
@@ -115,7 +115,7 @@ def lay_out(
 
 
 def _fallback(name: str, named: Mapping[str, int]) -> str | None:
-    """Parent by anatomy, for files without a hierarchy."""
+    """Parent by anatomy, for joints without a usable parent in the file."""
     side, _, part = name.rpartition(".")
     if side.rpartition(".")[2].startswith("toe"):  # left.toe1.base and the like
         side, part = side.partition(".")[0], "ball"
@@ -133,7 +133,7 @@ def _fallback(name: str, named: Mapping[str, int]) -> str | None:
 
 
 def _place_in_trunk(name: str) -> tuple[int, int]:
-    """Sorts the trunk's joints from pelvis to head."""
+    """Sort key of trunk joints, from pelvis to head."""
     part = name.rstrip("0123456789")
     if part not in _TRUNK:
         return _NO_TRUNK
@@ -143,7 +143,7 @@ def _place_in_trunk(name: str) -> tuple[int, int]:
 def _one_root(above: dict[str, str | None], notes: list[str]) -> None:
     roots = [name for name, parent in above.items() if parent is None]
     if len(roots) < 2 or all(name.endswith(".wrist") for name in roots):
-        return  # two hands without a body move on their own
+        return  # two hands without a body are independent
     main = "pelvis" if "pelvis" in roots else next((r for r in roots if r.endswith(".wrist")), roots[0])
     for name in roots:
         if name != main:
@@ -179,7 +179,7 @@ def _owner(
         if j in of_source:
             return number[of_source[j]]
     below = [number[of_source[j]] for j in tree.subtree(joint) if j in of_source]
-    if not below and tree.flat and of_source:  # no tree says whose it is: the nearest is the likeliest
+    if not below and tree.flat and of_source:  # without a hierarchy: the nearest recognised joint
         known = list(of_source)
         away = np.linalg.norm(tree.positions[known] - tree.positions[joint], axis=1)
         return number[of_source[known[int(away.argmin())]]]

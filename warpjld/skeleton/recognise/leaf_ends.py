@@ -1,7 +1,7 @@
-"""Ends of bones that files leave out: a joint without children carries flesh too, and turns it (R13).
+"""Completion of leaf joints by end joints: a joint without children moves skin beyond it, too (R13).
 
-The covering's segments run from joint to joint. Flesh beyond the last joint of a tail, an ear or a toe would hang on
-the segment before it, and the joint's own rotation would be lost.
+The covering's segments run from joint to joint. Without an end joint, the flesh beyond the last joint of a tail, an ear
+or a toe would follow the segment before it, and the joint's own rotation would be lost.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ __all__ = ["add_leaf_ends"]
 _IS_END = re.compile(
     r"((left|right)\.)?((thumb|index|middle|ring|pinky|hand|toe\d*)\.tip|heel)|head\.top|chin|nose_tip|sternum"
 )
-"""Canonical extremities: they end a bone and carry nothing."""
-_OWN = 0.5  # weight from which a vertex is a joint's own
-_SMALLEST = 5e-3  # of the skeleton's size: flesh that reaches less far needs no bone
-_ONE_SIDED = 0.2  # of its reach: centroid of the flesh, relative to the joint, that tells a direction
-_GOES_ON = 0.4  # of the bone before: how far a surface without weights must go on beyond its last joint
-_SHORTEST, _LONGEST = 0.3, 0.9  # of the flesh's reach: length of the added bone
-_FAR, _MUCH = 2.0, 0.15  # times the thickness, and share, of flesh far from all bones of its joint, that needs one more
+"""Canonical extremities, which end a bone and get no end of their own."""
+_OWN = 0.5  # smallest weight at which a vertex counts as owned by a joint
+_SMALLEST = 5e-3  # smallest reach of flesh that gets a bone, per size of the skeleton
+_ONE_SIDED = 0.2  # smallest distance of the flesh's centroid from the joint, per reach, that gives a direction
+_CONTINUES = 0.4  # smallest extent of a surface beyond its last joint, per length of the bone before (without weights)
+_SHORTEST, _LONGEST = 0.3, 0.9  # limits of the added bone's length, per reach of the flesh
+_FAR, _MUCH = 2.0, 0.15  # distance from all bones, per thickness, and share of such flesh, that call for another bone
 
 
 def add_leaf_ends(
@@ -41,16 +41,16 @@ def add_leaf_ends(
 ) -> None:
     """Add an end, ``tail3.end``, to every joint without children that owns skin and is no end itself.
 
-    Its place is where the joint's own skin reaches to; without weights, where the surface goes on along the bone
-    before.
+    It is placed at the end of the skin that the joint owns; without weights, where the surface ends along the
+    direction of the bone before.
 
     Args:
         layout: The canonical joints; ends are appended.
         vertices: Surface [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
-        painted: Whose skin is whose; None where nothing says.
-        branches: Whether joints with children get one too, where most of their skin lies beside and beyond the bones
-            that they have, as an animal's snout does where ears are the head's children.
+        painted: Painted weights; None without.
+        branches: Whether joints with children get one too, where a large part of their skin is far from the bones to
+            these, as an animal's snout is where only ears are children of the head.
     """
     size = float(np.linalg.norm(np.ptp(layout.positions, axis=0)))
     if painted is not None:
@@ -61,9 +61,9 @@ def add_leaf_ends(
         if _IS_END.fullmatch(name) or (kids and not (branches and painted is not None)):
             continue
         if painted is None:
-            end = _along_the_bone(layout, joint, vertices, faces)
+            end = _end_along_bone(layout, joint, vertices, faces)
         else:
-            end = _own_flesh(layout, joint, kids, vertices, faces, painted, _SMALLEST * size)
+            end = _end_of_skin(layout, joint, kids, vertices, faces, painted, _SMALLEST * size)
         if end is not None:
             added = f"{name}.end"
             while added in layout.names:
@@ -74,7 +74,7 @@ def add_leaf_ends(
         layout.notes.append(f"ends of bones added in the surface: {', '.join(found)}")
 
 
-def _along_the_bone(
+def _end_along_bone(
     layout: Layout, joint: int, vertices: NDArray[np.float64], faces: NDArray[np.int32]
 ) -> NDArray[np.float64] | None:
     parent = layout.parents[joint]
@@ -87,10 +87,10 @@ def _along_the_bone(
         return None
     near = nearby(vertices, faces, start, 4.0 * length)
     end = find_extremity(vertices, near, start, bone / length, length)
-    return end if end is not None and np.linalg.norm(end - start) > _GOES_ON * length else None
+    return end if end is not None and np.linalg.norm(end - start) > _CONTINUES * length else None
 
 
-def _own_flesh(
+def _end_of_skin(
     layout: Layout,
     joint: int,
     kids: list[int],
@@ -99,7 +99,7 @@ def _own_flesh(
     painted: Painted,
     smallest: float,
 ) -> NDArray[np.float64] | None:
-    """Where the skin that a joint owns reaches to; None where it owns none, or its bones serve most of it."""
+    """End of the skin that a joint owns; None where it owns none, or its bones cover nearly all of it."""
     share = np.where(layout.owner[painted.joints] == joint, painted.weights, 0.0).sum(axis=1)
     own = share > _OWN
     if own.sum() < 3:
@@ -107,7 +107,7 @@ def _own_flesh(
     start = layout.positions[joint]
     flesh = painted.points[own] - start
     if kids:
-        far = _far_from(flesh, [layout.positions[k] - start for k in kids])
+        far = _far_from_bones(flesh, [layout.positions[k] - start for k in kids])
         if far.mean() < _MUCH:
             return None
         flesh = flesh[far]
@@ -122,15 +122,15 @@ def _own_flesh(
     near = nearby(vertices, faces, start, 2.0 * reach)
     end = find_extremity(vertices, near, start, direction, beyond)
     if end is not None:
-        # the surface that the line meets may be another one's, or a fold of it
+        # the surface that the line meets may belong to another part, or be a fold
         length = float((end - start) @ direction)
         if _SHORTEST * beyond <= length <= beyond and np.linalg.norm(end - start) < 1.2 * length:
             return end
-    return start + _middle(flesh, direction, beyond)
+    return start + _far_centre(flesh, direction, beyond)
 
 
-def _far_from(flesh: NDArray[np.float64], bones: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
-    """Which flesh, relative to its joint, is about as far from the joint's bones as from the joint itself."""
+def _far_from_bones(flesh: NDArray[np.float64], bones: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """Mask of flesh, relative to its joint, that is nearly as far from the joint's bones as from the joint itself."""
     away = np.full(len(flesh), np.inf)
     for bone in bones:
         along = np.clip(flesh @ bone / max(float(bone @ bone), 1e-30), 0.0, 1.0)
@@ -140,7 +140,7 @@ def _far_from(flesh: NDArray[np.float64], bones: list[NDArray[np.float64]]) -> N
 
 
 def _direction(layout: Layout, joint: int, flesh: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
-    """Unit direction in which a joint's flesh lies: its centroid's, or else the bone's before, or its longest axis."""
+    """Unit direction of a joint's flesh: of its centroid, or else of the bone before, or its principal axis."""
     centre = flesh.mean(axis=0)
     if np.linalg.norm(centre) > _ONE_SIDED * reach:
         return unit(centre)
@@ -152,8 +152,8 @@ def _direction(layout: Layout, joint: int, flesh: NDArray[np.float64], reach: fl
     return np.asarray(longest if (flesh @ longest).max() >= -(flesh @ longest).min() else -longest)
 
 
-def _middle(flesh: NDArray[np.float64], direction: NDArray[np.float64], beyond: float) -> NDArray[np.float64]:
-    """Middle of the flesh near its far end, relative to the joint, one radius before it or at least half-way."""
+def _far_centre(flesh: NDArray[np.float64], direction: NDArray[np.float64], beyond: float) -> NDArray[np.float64]:
+    """Centre of the flesh near its far end, relative to the joint, one radius before the end or at least half-way."""
     along = flesh @ direction
     last = flesh[along > 0.6 * beyond]
     aside = last - np.outer(last @ direction, direction)

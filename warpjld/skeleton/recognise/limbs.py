@@ -1,4 +1,4 @@
-"""A limb's joints by its geometry: where a chain of joints, twist bones among them, has its hip and knee."""
+"""Division of a chain of joints, twist bones among them, into a limb's two segments by their lengths."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["FOREARM_RATIO", "SHIN_RATIO", "ankle_of", "divide_limb", "limb_misfit", "path_below", "toes_by_place"]
 
-FOREARM_RATIO = 0.9  # forearm per upper arm, elbow to wrist
-SHIN_RATIO = 1.0  # shin per thigh
-_ANKLE_TURN = np.radians(35.0)  # a leg turns by more than that from shin to foot
+FOREARM_RATIO = 0.9  # usual length of the forearm (elbow to wrist) per upper arm
+SHIN_RATIO = 1.0  # usual length of the shin per thigh
+_ANKLE_TURN = np.radians(35.0)  # smallest angle between shin and foot
 
 
 def path_below(tree: SourceTree, above: int, joint: int) -> list[int]:
-    """Joints between ``above``, left out, and ``joint``, included; from the root outwards."""
+    """Joints from ``above`` (excluded) down to ``joint`` (included)."""
     return [j for j in [joint, *tree.ancestors(joint)][::-1] if j not in (above, *tree.ancestors(above))]
 
 
 def limb_misfit(
     first: NDArray[np.float64], second: NDArray[np.float64], end: NDArray[np.float64], whole: float, ratio: float
 ) -> float:
-    """|log| of a limb's lower per upper length over the usual ratio; infinite where they make no limb."""
+    """|log| of the ratio of lower to upper length, per usual ratio; infinite for degenerate limbs."""
     upper, lower = float(np.linalg.norm(second - first)), float(np.linalg.norm(end - second))
     if min(upper, lower) < 0.05 * whole or upper + lower < 0.7 * whole:
         return np.inf
@@ -35,13 +35,13 @@ def limb_misfit(
 def divide_limb(
     tree: SourceTree, chain: Sequence[int], ratio: float, fixed: Mapping[int, Collection[int]] | None = None
 ) -> tuple[int, int, float]:
-    """The two joints that part a limb into segments of the usual ratio and nearly its whole length, and their misfit.
+    """The two joints that divide a limb into segments of the usual ratio and nearly its whole length, and the misfit.
 
     Args:
         tree: The file's joints.
-        chain: The limb's, from the trunk to its end (wrist, ankle), at least two.
+        chain: Joints of the limb, from the trunk to its end (wrist, ankle), at least two.
         ratio: Usual length of the lower segment per that of the upper.
-        fixed: 0 (hip, shoulder) or 1 (knee, elbow) → joints that it may be; any where it is left out.
+        fixed: 0 (hip, shoulder) or 1 (knee, elbow) → allowed joints; all joints for missing keys.
     """
     at = tree.positions[list(chain)]
     whole = max(float(np.linalg.norm(p - at[-1])) for p in at)
@@ -59,7 +59,7 @@ def divide_limb(
 
 
 def ankle_of(tree: SourceTree, leg: Sequence[int]) -> int:
-    """Place in ``leg`` where toes branch off, or where the chain turns into the foot."""
+    """Index in ``leg`` of the ankle: where toes branch off, or where the chain turns into the foot."""
     if tree.children[leg[-1]] or len(leg) < 4:
         return len(leg) - 1
     bones = np.diff(tree.positions[list(leg)], axis=0)
@@ -71,13 +71,13 @@ def ankle_of(tree: SourceTree, leg: Sequence[int]) -> int:
 
 
 def toes_by_place(tree: SourceTree, heads: Sequence[int], side: str, outwards: NDArray[np.float64]) -> dict[str, int]:
-    """Joints of toes that begin at ``heads``: the big toe is the innermost.
+    """Joints of the toes that start at ``heads``, numbered from the innermost (the big toe).
 
     Args:
         tree: The file's joints.
         heads: First joint of each toe.
-        side: Which foot.
-        outwards: From the middle of the body to the foot, shape (3,).
+        side: ``left`` or ``right``.
+        outwards: Direction from the middle of the body to the foot, shape (3,).
     """
     out: dict[str, int] = {}
     for n, head in enumerate(sorted(heads, key=lambda j: float(outwards @ tree.positions[j])), start=1):

@@ -1,11 +1,11 @@
-"""Words in joint names of the common conventions, and what they mean.
+"""Parser of joint names in the common conventions.
 
 WebXR ``index-finger-phalanx-proximal``, SMPL-X ``left_index1``, MakeHuman and Anny ``finger2-1.L``, Mixamo
 ``mixamorig:LeftHandIndex1``, Leap ``L_index_a``, Godot and VRM ``LeftIndexProximal`` ``J_Bip_L_Index1``, OpenXR
 ``Index_Proximal_L``, Unreal ``index_01_l``, Rigify ``f_index.01.L``, Poser and DAZ ``lIndex1``, Rokoko
 ``LeftFinger2Proximal``, Xsens ``LeftSecondPP``, Perception Neuron and HumanIK ``LeftInHandIndex``, Biped
-``Bip01 L Finger1``, OptiTrack ``LUArm``, CMU ``lhumerus``, Kinect ``ElbowLeft``, MikuMikuDance ``左ひじ``: all are a
-side, a few words and a number, so one vocabulary reads them all.
+``Bip01 L Finger1``, OptiTrack ``LUArm``, CMU ``lhumerus``, Kinect ``ElbowLeft``, MikuMikuDance ``左ひじ``: all consist
+of a side, a few words and a number, so one vocabulary reads them all.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _DIGITS = {
     "small": "pinky",
 }
 _ORDINALS = {"first": "thumb", "second": "index", "third": "middle", "fourth": "ring", "fifth": "pinky"}
-"""Of Xsens, before a phalanx: ``FirstMC``, ``SecondPP``."""
+"""Xsens digits, before a phalanx: ``FirstMC``, ``SecondPP``."""
 _PHALANGES = {"mc": 0, "pp": 1, "mp": 2, "dp": 3}
 _NUMBERED_DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 _RANKS = {
@@ -140,7 +140,7 @@ _HELPERS = {
 }
 _FILLERS = {"finger", "fingers", "knuckle", "phalanx", "joint", "bone", "def", "org", "bip", "mixamorig", "bend", "big"}
 _VERTEBRAE = ("L5", "L3", "T12", "T8")
-"""Xsens names segments of the spine so; ``L`` is no side there."""
+"""Xsens names of spine segments; ``L`` is not a side here."""
 _NOT_SIDED = {"root", "armature", "pelvis", "hips", "head", "neck", "spine", "chest", "upperchest", "torso", "ab"}
 _COMPOUNDS = {
     ("upper", "arm"),
@@ -167,22 +167,22 @@ _LONG_FIRST = sorted(
 )
 _WORDS = {*_SIDES, *_DIGITS, *_RANKS, *_KINDS, *_HELPERS, *_FILLERS}
 _SIDED = {*_DIGITS, *_KINDS, "fingers", "metacarpal", "carpal", "palm"} - _NOT_SIDED
-"""What a single letter of a side may stand before without a capital."""
+"""Words before which a lower-case ``l`` or ``r`` is a side (``lfemur``)."""
 _CAPITALS = re.compile(r"(^|_)[LR][UF]Arm$")
-"""Of OptiTrack: four capitals would else be read as one word."""
+"""OptiTrack's ``LUArm``: consecutive capitals would otherwise be read as one word."""
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a joint's name says.
+    """A parsed joint name.
 
     Attributes:
         side: ``left``, ``right`` or None.
-        kind: ``digit``, ``carpal`` (a palm bone whose digit the name does not tell), ``toe``, ``wrist``, ``hand``,
-            ``forearm``, …; ``helper`` for twist bones and controls; None where the name says nothing.
+        kind: ``digit``, ``carpal`` (a palm bone of unstated digit), ``toe``, ``wrist``, ``hand``, ``forearm``, …;
+            ``helper`` for twist bones and controls; None if the name is not understood.
         digit: Digit, for kind ``digit``.
-        rank: 0 metacarpal, 1 proximal, 2 intermediate, 3 distal, 4 tip, where a word says so.
-        number: Number in the name, where there is one.
+        rank: 0 metacarpal, 1 proximal, 2 intermediate, 3 distal, 4 tip; None if no word states it.
+        number: Number in the name, if any.
     """
 
     side: str | None = None
@@ -233,7 +233,7 @@ def _digit(words: list[str], number: int | None) -> tuple[str | None, int | None
     if "finger" in words and "extra" not in words:
         counts = [w for w in words[words.index("finger") :] if w.isdigit()]
         if len(counts) == 1 and 1 <= int(counts[0]) <= 5 and any(w in _NAMED_RANKS for w in words):
-            return _NUMBERED_DIGITS[int(counts[0]) - 1], rank, None  # Rokoko's LeftFinger1Proximal is a thumb's
+            return _NUMBERED_DIGITS[int(counts[0]) - 1], rank, None  # Rokoko's LeftFinger1Proximal is the thumb
         return _numbered(counts)[0], rank, _numbered(counts)[1]
     return None, rank, number
 
@@ -250,7 +250,7 @@ def _rank(words: list[str]) -> int | None:
 
 
 def _numbered(numbers: list[str]) -> tuple[str | None, int | None]:
-    """``finger2-1`` counts the thumb as 1 (MakeHuman); ``Finger0``, ``Finger01`` as 0 (Biped)."""
+    """Digit and number: ``finger2-1`` counts the thumb as 1 (MakeHuman), ``Finger0`` and ``Finger01`` as 0 (Biped)."""
     if len(numbers) >= 2 and 1 <= int(numbers[0]) <= 5:
         return _NUMBERED_DIGITS[int(numbers[0]) - 1], int(numbers[1])
     if len(numbers) == 1 and len(numbers[0]) <= 2 and int(numbers[0][0]) <= 4:
@@ -275,7 +275,7 @@ def _words(name: str) -> list[str]:
 
 
 def _split(piece: str) -> list[str]:
-    """Words run together, as in ``lefthandindex`` or ``lfemur``; the piece itself where it is not of known words."""
+    """Split concatenated words as in ``lefthandindex`` or ``lfemur``; the piece itself unless all are known."""
     if piece in _WORDS or len(piece) < 4:
         return [piece]
     found = _known(piece)
@@ -286,7 +286,7 @@ def _split(piece: str) -> list[str]:
 
 
 def _known(piece: str) -> list[str]:
-    """The known words a piece is made of, longest first; none where anything is left over."""
+    """Greedy split of a piece into known words, longest first; empty unless it is used up."""
     out = []
     while piece:
         word = next((w for w in _LONG_FIRST if piece.startswith(w)), None)

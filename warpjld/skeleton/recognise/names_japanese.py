@@ -1,4 +1,4 @@
-"""Words of MikuMikuDance's joint names, ``左ひじ``, ``右人指１``, and the English ones of the same meaning."""
+"""Translation of MikuMikuDance's Japanese joint names, such as ``左ひじ`` and ``右人指１``, to English."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _LONG_FIRST = re.compile("|".join(sorted(_WORDS, key=len, reverse=True)))
 
 
 def in_english(name: str) -> str:
-    """A joint's name with its Japanese words translated, and wide letters and digits as usual ones."""
+    """A joint name with its Japanese words translated and full-width characters normalised (NFKC)."""
     if name.isascii():
         return name
     return _LONG_FIRST.sub(lambda word: f" {_WORDS[word[0]]} ", unicodedata.normalize("NFKC", name))

@@ -1,4 +1,4 @@
-"""A file's skin weights, and what they say of joints that recognition made one."""
+"""A file's painted skin weights, and their use to choose among joints that recognition merged."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from warpjld.skeleton.recognise.layout import Layout
 from warpjld.skeleton.recognise.tree import SourceTree
 
-__all__ = ["Painted", "let_flesh_lead"]
+__all__ = ["Painted", "prefer_skinned_joints"]
 
-_NONE = 0.02  # share of the skin of joints that are one, below which a joint has none
+_NONE = 0.02  # share of the skin of all merged joints, up to which one of them owns no skin
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,18 +34,18 @@ class Painted:
         return np.asarray(np.bincount(self.joints.ravel(), self.weights.ravel(), minlength=count), dtype=np.float64)
 
 
-def let_flesh_lead(layout: Layout, tree: SourceTree, painted: Painted) -> None:
-    """Let the joint that carries the flesh stand for those that recognition made one with it.
+def prefer_skinned_joints(layout: Layout, tree: SourceTree, painted: Painted) -> None:
+    """Replace joints without skin by the joint with skin that was merged into them.
 
-    Files put roots above the hips: joints without skin, at the origin maybe, that no flesh turns with. Where such a
-    one was taken for a joint of the skeleton, the one below it that has the skin takes its place.
+    Files have roots above the hips: joints without skin, maybe at the origin, that do not move with the body. Where
+    such a one was recognised as a joint of the skeleton, its descendant that owns the skin takes its place.
     """
     amounts = painted.amounts(len(tree))
     for joint, source in enumerate(layout.sources):
         if source < 0:
             continue
-        one = np.flatnonzero(layout.owner == joint)
-        if not amounts[source] <= _NONE * amounts[one].sum():
+        merged = np.flatnonzero(layout.owner == joint)
+        if not amounts[source] <= _NONE * amounts[merged].sum():
             continue
         below = {
             a
@@ -53,7 +53,7 @@ def let_flesh_lead(layout: Layout, tree: SourceTree, painted: Painted) -> None:
             if parent == joint and layout.sources[k] >= 0
             for a in tree.ancestors(layout.sources[k])
         }
-        leading = [int(s) for s in one if amounts[s] > 0.0 and int(s) in below and source in tree.ancestors(int(s))]
+        leading = [int(s) for s in merged if amounts[s] > 0.0 and int(s) in below and source in tree.ancestors(int(s))]
         if leading:
             lead = max(leading, key=lambda s: (amounts[s], -s))
             layout.sources[joint] = lead

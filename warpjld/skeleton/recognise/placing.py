@@ -1,4 +1,4 @@
-"""Suspicious joint placing (R14): a joint that is not where joints belong is what deforms badly."""
+"""Detection of misplaced joints (R14), which cause bad deformation."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from warpjld.skeleton.tree import Skeleton
 __all__ = ["Finding", "check_placing", "in_trunk", "outside_surface"]
 
 _OFF_CENTRE = 0.5  # |a − b| / (a + b) of the flesh on both sides: at 0.5 one side is three times the other
-_NARROW = 1.6  # a section wider than this times its depth is judged by its depth alone (palms)
-_PAD = (0.4, 2.5)  # flesh beyond an extremity per half thickness there: 1 in the centre of a round end
-_SAMPLES = 5  # points of a segment that are looked at
-# trunk joints follow the spine, which lies at the back: off-centre is where they belong
+_NARROW = 1.6  # sections wider than this times their depth are judged by depth alone (palms)
+_PAD = (0.4, 2.5)  # range of flesh beyond an extremity per half thickness there: 1 in the centre of a round end
+_SAMPLES = 5  # samples of a segment
+# trunk joints follow the spine, which lies towards the back, so that they are off-centre by nature
 _DIGIT = (0.06, 0.66)
-"""Share of the flesh, from the back, at which joints of digits lie: their bones run under the back's skin, the pad lies
-below. Toes of others lie at .08, knuckles at .2 to .5."""
-_CROWN = 0.02  # of the height: about half a head's radius
-_SPINE_AT = 0.3  # of the trunk's depth from its back: where a joint of the spine is proposed
+"""Range of the place of a digit's joints, as a share of the flesh from the back: bones run close to the back's skin,
+the pad lies below. Existing rigs have toes at .08, knuckles at .2 to .5."""
+_CROWN = 0.02  # tolerance of the head's extremity, per height of the body: about half a head's radius
+_SPINE_AT = 0.3  # proposed place of a spine joint, per depth of the trunk from its back
 _SPINE = (0.07, 0.56)
-"""Likewise joints of the spine in the trunk: of others .15 to .46."""
+"""Range of the place of spine joints, per depth of the trunk from its back: .15 to .46 in existing rigs."""
 
 _WORDS = {
     "proportion": "is misplaced along its limb",
@@ -46,15 +46,15 @@ _TRUNK = ("pelvis", "spine", "neck", "head", "clavicle", "shoulder", "hip", "top
 
 @dataclass(frozen=True)
 class Finding:
-    """One doubtful placing.
+    """A suspicious joint position.
 
     Attributes:
         joint: The joint, or the far end of the segment.
         kind: ``outside``, ``off-centre``, ``coincident``, ``leaves``, ``extremity``, ``proportion``, ``asymmetric`` or
             ``midline``.
-        amount: How far: a distance [m] for ``coincident``, else a ratio.
-        detail: What was measured, for people; may be empty.
-        proposal: Displacement that puts it where it is expected [mm], or None where nothing tells.
+        amount: Size of the deviation: a distance [m] for ``coincident``, else a ratio.
+        detail: Description of the measurement for the user; may be empty.
+        proposal: Displacement to the expected position [mm], or None if that is unknown.
     """
 
     joint: str
@@ -65,13 +65,13 @@ class Finding:
 
     @property
     def message(self) -> str:
-        """One line for people."""
-        said = f"{self.joint} {_WORDS[self.kind]}" + (f": {self.detail}" if self.detail else "")
+        """One line for the user."""
+        text = f"{self.joint} {_WORDS[self.kind]}" + (f": {self.detail}" if self.detail else "")
         if self.proposal is None:
-            return said
+            return text
         x, y, z = self.proposal
         length = float(np.linalg.norm(self.proposal))
-        return f"{said}; proposed: move it {length:.1f} mm, by ({x:+.1f}, {y:+.1f}, {z:+.1f}) mm"
+        return f"{text}; proposed: move it {length:.1f} mm, by ({x:+.1f}, {y:+.1f}, {z:+.1f}) mm"
 
 
 def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[Finding, ...]:
@@ -82,22 +82,22 @@ def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
         vertices: Rest surface [m], shape (V, 3).
         faces: Its triangles, shape (T, 3), anticlockwise seen from outside.
     """
-    findings = _coincident(skeleton, vertices)
+    findings = _check_coincident(skeleton, vertices)
     ends = _open_ends(vertices, faces)
     inside = _inside(vertices, faces, skeleton.rest, ends)
     for j in np.flatnonzero(~inside):
-        back = _millimetres(_way_back(skeleton, vertices[np.unique(faces)], int(j)))
+        back = _millimetres(_displacement_inside(skeleton, vertices[np.unique(faces)], int(j)))
         findings.append(Finding(skeleton.names[j], "outside", 1.0, "", back))
-    findings += _leaving(skeleton, vertices, faces, inside, ends)
-    findings += _sections(skeleton, vertices, faces, inside)
-    findings += _spine(skeleton, vertices, faces, inside)
-    findings += _expected(skeleton, vertices, faces)
-    findings += _crown(skeleton, vertices, faces)
-    return tuple(_one_a_joint(findings))
+    findings += _check_segments(skeleton, vertices, faces, inside, ends)
+    findings += _check_sections(skeleton, vertices, faces, inside)
+    findings += _check_spine(skeleton, vertices, faces, inside)
+    findings += _check_expected(skeleton, vertices, faces)
+    findings += _check_crown(skeleton, vertices, faces)
+    return tuple(_one_per_joint(findings))
 
 
-def _one_a_joint(findings: list[Finding]) -> list[Finding]:
-    """Of what is found at one joint, the first that says where it belongs, at the place of the first of all."""
+def _one_per_joint(findings: list[Finding]) -> list[Finding]:
+    """One finding per joint: the first, completed by the first proposal found for that joint."""
     best: dict[str, Finding] = {}
     for one in findings:
         had = best.get(one.joint)
@@ -109,8 +109,9 @@ def _one_a_joint(findings: list[Finding]) -> list[Finding]:
     return list(best.values())
 
 
-def _way_back(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> NDArray[np.float64]:
-    """From outside the surface back into it: in the spine between its neighbours, else past the nearest skin."""
+def _displacement_inside(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> NDArray[np.float64]:
+    """Displacement of a joint from outside into the surface: a spine joint to between its neighbours, others past the
+    nearest vertex."""
     place = skeleton.rest[joint]
     above, below = int(skeleton.parents[joint]), skeleton.children[joint]
     if skeleton.names[joint].startswith(("spine", "neck")) and above >= 0 and below:
@@ -124,8 +125,8 @@ def _way_back(skeleton: Skeleton, vertices: NDArray[np.float64], joint: int) -> 
     return np.asarray(inwards * (1.0 + 0.01 / max(length, 0.01)))
 
 
-def _crown(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
-    """The head's extremity away from the centre of the head's round top."""
+def _check_crown(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
+    """Check the head's extremity against the centre of the head's rounded top."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     up, _ = body_frame(joints)
     if up is None or "head.top" not in joints:
@@ -152,8 +153,8 @@ def _millimetres(offset: NDArray[np.float64]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
-    """Joints that like joints of the same body put elsewhere."""
+def _check_expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
+    """Joints that deviate from comparable joints of the same body."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     found = finger_expectations(joints)
     up, _ = body_frame(joints)
@@ -177,9 +178,9 @@ def _expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[
 def body_frame(
     joints: Mapping[str, NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
-    """Up and forward of an upright body, each along the axis it is nearest to; None where its joints do not tell.
+    """Up and forward of an upright body, each snapped to the nearest coordinate axis; None where joints are missing.
 
-    The axes, not the joints: one of these may be the misplaced one.
+    Snapped, because one of the joints may be the misplaced one.
     """
     if not {"pelvis", "head", "left.hip", "right.hip"} <= set(joints):
         return None, None
@@ -192,7 +193,7 @@ def body_frame(
     return up, np.sign(across[j]) * np.eye(3)[j]
 
 
-def _spine(
+def _check_spine(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], inside: NDArray[np.bool_]
 ) -> list[Finding]:
     """Joints of the spine too near to belly or back."""
@@ -214,7 +215,7 @@ def _spine(
     return out
 
 
-def _coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Finding]:
+def _check_coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Finding]:
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     pairs = close_pairs(skeleton.rest, 1e-3 * size)
     out = []
@@ -225,7 +226,7 @@ def _coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list[Findi
 
 
 def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> list[tuple[NDArray[np.float64], float]]:
-    """Centre and radius of every hole's rim: wrists may be cut open there."""
+    """Centre and radius of every boundary loop: wrists may be cut open there."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     rim = unique[count == 1]
@@ -243,7 +244,7 @@ def _open_ends(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> lis
 def outside_surface(
     vertices: NDArray[np.float64], faces: NDArray[np.integer], points: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Which points lie outside a surface that may be open at its ends, shape (n,)."""
+    """Mask of points outside a surface that may be open at its ends, shape (n,)."""
     return ~_inside(vertices, faces, points, _open_ends(vertices, faces))
 
 
@@ -253,7 +254,7 @@ def _inside(
     points: NDArray[np.float64],
     ends: list[tuple[NDArray[np.float64], float]],
 ) -> NDArray[np.bool_]:
-    """Inside the surface, or in the mouth of an open end, where a winding number fades to one half."""
+    """Whether points are inside the surface, or near an open end, where the winding number fades to one half."""
     if not len(points):
         return np.zeros(0, dtype=bool)
     inside = winding_numbers(vertices, faces, points) > 0.5
@@ -262,7 +263,7 @@ def _inside(
     return inside
 
 
-def _leaving(
+def _check_segments(
     skeleton: Skeleton,
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
@@ -284,10 +285,10 @@ def _leaving(
     return out
 
 
-def _sections(
+def _check_sections(
     skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], inside: NDArray[np.bool_]
 ) -> list[Finding]:
-    """Flesh on the four sides of every joint, and beyond every extremity."""
+    """Check the flesh on the four sides of every joint, and beyond every extremity."""
     joints = [j for j in np.flatnonzero(inside) if not in_trunk(skeleton.names[j])]
     if not joints:
         return []
@@ -301,7 +302,7 @@ def _sections(
         name = skeleton.names[j]
         digit = _in_digit(name)
         if digit:
-            out += _digit(name, bone[k], axis[k], up, down)
+            out += _check_digit(name, bone[k], axis[k], up, down)
         ratios = []
         for a, b, side in ((up, down, ("back", "front")), (left, right, ("one side", "other side"))):
             if np.isfinite(a) and np.isfinite(b) and a + b <= _NARROW * min(up + down, left + right):
@@ -326,8 +327,10 @@ def _in_digit(name: str) -> bool:
     return digit in DIGITS or digit.startswith("toe")
 
 
-def _digit(name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back: float, front: float) -> list[Finding]:
-    """A digit's joint too near to its back or its pad; at its base, where neighbours are grown together, likewise."""
+def _check_digit(
+    name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back: float, front: float
+) -> list[Finding]:
+    """Check whether a digit's joint is too near to the digit's back or pad."""
     whole = back + front
     if not np.isfinite(whole) or name.endswith(("carpometacarpal", "thumb.base")):
         return []
@@ -339,5 +342,5 @@ def _digit(name: str, bone: NDArray[np.float64], axis: NDArray[np.float64], back
 
 
 def in_trunk(name: str) -> bool:
-    """Whether a joint of this canonical name is the trunk's, hips and shoulders among them."""
+    """Whether a joint of this canonical name belongs to the trunk, including hips and shoulders."""
     return name.rpartition(".")[2].rstrip("0123456789") in _TRUNK

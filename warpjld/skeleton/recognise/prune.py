@@ -1,4 +1,4 @@
-"""A joint tree without the joints that own no flesh, for recognition by shape."""
+"""Removal of joints without skin from a joint tree, before recognition by shape."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["prune"]
 
 
 def prune(tree: SourceTree, flesh: JointFlesh) -> tuple[SourceTree, list[int]]:
-    """The tree without dead joints, those that merely pass on between two others, and twist joints.
+    """The tree without dead joints, twist joints, and joints on the line between two others.
 
     Returns:
-        The smaller tree, and for each of its joints its number in ``tree``.
+        The smaller tree, and for each of its joints its index in ``tree``.
     """
     gone = flesh.dead.copy()
     if flesh.known:

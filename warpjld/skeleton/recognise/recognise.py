@@ -1,4 +1,4 @@
-"""Finding hands and bodies in a joint tree: by names, and by shape where names say nothing; checked by geometry."""
+"""Recognition of hands and bodies in a joint tree: by names, else by shape; checked by geometry."""
 
 from __future__ import annotations
 
@@ -30,21 +30,22 @@ def recognise(
     *,
     by_shape: bool = True,
 ) -> Roles:
-    """Parts of a joint tree; an empty result where it is neither a hand nor a body.
+    """Roles of a joint tree's joints; empty where it is neither a hand nor a body.
 
-    Names propose, or the tree's shape where they say nothing; lengths, symmetry and the skin each joint owns must
-    agree. What does not is settled by geometry, with a note, or told in ``Roles.suspicious``.
+    Roles are proposed by names, or by the tree's shape if no name is understood, and checked against lengths, symmetry
+    and the skin that each joint owns. Conflicts are resolved by geometry, with a note, or reported in
+    ``Roles.suspicious``.
 
     Args:
         tree: The file's joints.
         shares: Share of the surface that each joint moves, shape (N,), as from
-            :func:`~warpjld.skeleton.recognise.flesh.flesh_shares`; None where no skin tells.
-        stated: Canonical joints → the file's joints, stated by hand (see :mod:`.joint_map`): wins over everything.
-        by_shape: Whether the tree's shape is asked where names say nothing: not where a file's own table states what
-            is what, and hair would only be taken for limbs.
+            :func:`~warpjld.skeleton.recognise.flesh.flesh_shares`; None without painted weights.
+        stated: Canonical joints → the file's joints, stated by the user (see :mod:`.joint_map`); overrides all else.
+        by_shape: Whether to fall back to the tree's shape; not where a file's own table states the joints, and hair
+            would only be taken for limbs.
 
     Raises:
-        InputError: ``stated`` names joints that are not there.
+        InputError: ``stated`` names joints that the file does not have.
     """
     flesh = JointFlesh(tree, shares)
     by_hand = JointMap(tree, stated or {})
@@ -62,7 +63,7 @@ def recognise(
 
 
 def _checked(tree: SourceTree, roles: Roles, flesh: JointFlesh, by_hand: JointMap) -> Roles:
-    """What names or shape propose, with what is stated, as far as geometry agrees."""
+    """Proposed roles merged with the stated ones, completed, and checked by geometry."""
     by_hand.apply(roles)
     fill_hands(tree, roles, flesh, by_hand.names)
     check_limbs(tree, roles, flesh, by_hand.names)

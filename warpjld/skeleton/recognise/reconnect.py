@@ -1,4 +1,4 @@
-"""A hierarchy for files that have none: bones point at the next joint, whatever axis of the frame they lie on."""
+"""Reconstruction of a hierarchy for flat files: bones point at the next joint along a common axis of their frames."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["reconnect"]
 
-_ALIGNED = 0.98  # cosine between a bone and the way to the next joint
+_ALIGNED = 0.98  # smallest cosine between a bone and the direction to the next joint
 
 
 def reconnect(tree: SourceTree) -> SourceTree:
-    """Chain the joints of one flat hand by their bone axes; the tree itself where frames do not tell.
+    """Link the joints of one flat hand by their bone axes; the tree itself where frames are not conclusive.
 
-    Every joint's bone points at the next joint of its digit, on the same axis of all frames. The joint that is
-    furthest from the ends of the digits is the wrist, on which all chains hang.
+    Every joint's bone points at the next joint of its digit, along the same axis of all frames. The chain head that is
+    furthest from the ends of the digits is the wrist, the parent of all chains.
     """
     ways = [_followers(tree, sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)]
-    # straight fingers can be followed both ways: outwards they spread
+    # straight fingers can be followed in both directions: outwards they spread
     ways = [way for way in ways if _spread(tree, _ends(way)) > _spread(tree, _heads(way))]
-    best = max(ways, key=_links, default=[])
-    if _links(best) < 0.6 * len(tree):
+    best = max(ways, key=_count_links, default=[])
+    if _count_links(best) < 0.6 * len(tree):
         return tree
     ends, heads = _ends(best), _heads(best)
     middle = tree.positions[ends].mean(axis=0)
@@ -39,7 +39,7 @@ def reconnect(tree: SourceTree) -> SourceTree:
 
 
 def _followers(tree: SourceTree, axis: NDArray[np.float64]) -> list[int]:
-    """The joint each one's bone points at, -1 for none; each is followed by its nearest predecessor only."""
+    """Index of the joint that each bone points at, -1 for none; each is followed by its nearest predecessor only."""
     directions = bone_directions(tree, axis)
     away = tree.positions[None] - tree.positions[:, None]
     distance = np.linalg.norm(away, axis=2)
@@ -65,5 +65,5 @@ def _spread(tree: SourceTree, joints: list[int]) -> float:
     return float(np.linalg.norm(tree.positions[joints].std(axis=0))) if joints else 0.0
 
 
-def _links(after: list[int]) -> int:
+def _count_links(after: list[int]) -> int:
     return sum(j >= 0 for j in after)

@@ -1,4 +1,4 @@
-"""What recognition finds: which joint of the file plays which part in a hand or body."""
+"""Result of recognition: which joint of the file plays which role in a hand or body."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 __all__ = ["BY_MAP", "HandRoles", "Roles"]
 
 BY_MAP = "--map (inspect --write-map writes what was recognised, for editing)"
-"""How joints are stated by hand, for messages of what is suspicious."""
+"""How to state joints, as used in warnings."""
 
 
 @dataclass
 class HandRoles:
-    """One hand: canonical names without the side (``index.base``) → joint numbers of the file."""
+    """One hand: canonical names without the side (``index.base``) → joint indices of the file."""
 
     side: str | None
     joints: dict[str, int]
@@ -20,15 +20,15 @@ class HandRoles:
 
 @dataclass
 class Roles:
-    """All parts found in a file.
+    """All roles found in a file.
 
     Attributes:
-        hands: Its hands; their wrists are in ``body`` terms the arms' ends.
-        body: Canonical names of everything else (``left.elbow``, ``spine1``) → joint numbers.
+        hands: Its hands, wrists included.
+        body: Canonical names of all other joints (``left.elbow``, ``spine1``) → joint indices.
         how: ``names`` or ``shape``.
-        notes: What was settled otherwise than names say.
-        suspicious: What is doubtful, and what to do about it.
-        left_out: Joints of the file that are to be no joints of their own.
+        notes: Decisions that differ from the joints' names.
+        suspicious: Doubtful results, each with a remedy.
+        left_out: Joints of the file that are not to be kept as joints.
     """
 
     hands: list[HandRoles] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Looking at a surface from inside: rays and cross-sections around a point of the skeleton."""
+"""Ray casting and cross-sections of a surface around a point of the skeleton."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _CHUNK = 2_000_000  # ray–triangle pairs at a time: about 200 MB of temporarie
 
 @dataclass(frozen=True)
 class CrossSection:
-    """The surface around a point, in the plane through it.
+    """Cross-section of a surface in a plane through a point.
 
     Attributes:
         centre: Centroid of the section, shape (3,).
         radius: Radius of the circle of the same area.
-        seen: Share of the directions in which a surface was met: below 1 at open ends.
+        seen: Share of the rays that hit the surface: below 1 at open ends.
     """
 
     centre: NDArray[np.float64]
@@ -32,7 +32,7 @@ class CrossSection:
 def nearby(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], centre: NDArray[np.float64], radius: float
 ) -> NDArray[np.int32]:
-    """Faces that may reach within ``radius`` of ``centre``: what a hand needs of a body."""
+    """Faces that may reach within ``radius`` of ``centre``, shape (n, 3)."""
     middle, extent = _spheres(vertices[faces])
     away = middle - centre
     return faces[np.sqrt(np.einsum("tk,tk->t", away, away)) < radius + extent]
@@ -52,12 +52,12 @@ def first_hits(
     corners = vertices[faces]
     middle, extent = _spheres(corners)
     extent *= 1 + 1e-9
-    # rays that start in one place see every triangle in the same direction
+    # rays with a common origin share the vectors to the triangles
     apart = slice(None) if (origins != origins[0]).any() else slice(1)
     rows = max(1, _CHUNK // len(faces))
     for start in range(0, len(origins), rows):
         origin, direction = origins[start : start + rows], directions[start : start + rows]
-        # only triangles whose bounding sphere a ray meets are looked at closely
+        # exact tests only for triangles whose bounding sphere the ray meets
         away = middle - origin[apart, None]
         along = (away @ direction[..., None])[..., 0] if len(away) > 1 else direction @ away[0].T
         aside = np.einsum("rtk,rtk->rt", away, away) - along**2
@@ -68,7 +68,7 @@ def first_hits(
 
 
 def _spheres(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Middles (T, 3) and radii (T,) of spheres around triangles (T, 3, 3)."""
+    """Centres (T, 3) and radii (T,) of bounding spheres of triangles (T, 3, 3)."""
     middle = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
     spokes = corners - middle[:, None]
     return middle, np.sqrt(np.einsum("tnk,tnk->tn", spokes, spokes).max(axis=1))
@@ -77,7 +77,7 @@ def _spheres(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
 def _distances(
     corners: NDArray[np.float64], origin: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Distance of one ray to one triangle each, ``inf`` where they miss."""
+    """Distance along each ray to its triangle, ``inf`` for misses."""
     edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = np.cross(direction, edge2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -98,7 +98,7 @@ def cross_section(
     direction: NDArray[np.float64],
     rays: int = 24,
 ) -> CrossSection | None:
-    """The first surface met around ``point`` in the plane normal to ``direction``; None where hardly any is."""
+    """The first surface hit around ``point`` in the plane normal to ``direction``; None if too few rays hit any."""
     across = unit(np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))]))
     angle = np.arange(rays) * (2 * np.pi / rays)
     spokes = np.outer(np.cos(angle), across) + np.outer(np.sin(angle), np.cross(direction, across))

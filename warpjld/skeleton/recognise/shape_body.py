@@ -1,4 +1,4 @@
-"""Bodies by the tree's shape: two arms that end in hands, a trunk, two legs and a head."""
+"""Recognition of bodies by the tree's shape: two arms that end in hands, a trunk, two legs and a head."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["body_by_shape"]
 
 
 def body_by_shape(tree: SourceTree, hands: list[dict[str, int]]) -> Roles:
-    """Parts of a body whose two hands are found; sides from the hands' own shape and the feet."""
+    """Roles of a body whose two hands are known; sides are found from the hands' chirality and the feet."""
     roles = Roles(how="shape")
     wrists = [hand["wrist"] for hand in hands]
     chest = next(j for j in tree.ancestors(wrists[0]) if j in tree.ancestors(wrists[1]))
@@ -42,17 +42,17 @@ def body_by_shape(tree: SourceTree, hands: list[dict[str, int]]) -> Roles:
 
 
 def _legs(tree: SourceTree, trunk: list[int]) -> tuple[list[list[int]], int]:
-    """The two longest chains that leave the trunk at one joint below the chest, and that joint."""
+    """The two longest chains that branch off the trunk at one joint below the chest, and that joint."""
     for joint in trunk[1:]:
         heads = [c for c in tree.children[joint] if c not in trunk]
         if heads:
-            chains = [c for head in heads if len(c := _single_file(tree, head)) >= 3]
+            chains = [c for head in heads if len(c := _unbranched_chain(tree, head)) >= 3]
             if len(chains) >= 2:
                 return sorted(chains, key=lambda c: -_length(tree, c))[:2], joint
     return [], trunk[-1]
 
 
-def _single_file(tree: SourceTree, head: int) -> list[int]:
+def _unbranched_chain(tree: SourceTree, head: int) -> list[int]:
     chain = [head]
     while len(tree.children[chain[-1]]) == 1:
         chain.append(tree.children[chain[-1]][0])
@@ -81,9 +81,9 @@ def _head(tree: SourceTree, chest: int, wrists: list[int]) -> dict[str, int]:
     rest = [c for c in tree.children[chest] if not any(c == w or c in tree.ancestors(w) for w in wrists)]
     if not rest:
         return {}
-    chain = max((_single_file(tree, head) for head in rest), key=lambda c: _length(tree, c))
+    chain = max((_unbranched_chain(tree, head) for head in rest), key=lambda c: _length(tree, c))
     leaf = not tree.children[chain[-1]]
-    last = len(chain) - 2 if leaf and len(chain) >= 3 else len(chain) - 1  # a third one is the top of the head
+    last = len(chain) - 2 if leaf and len(chain) >= 3 else len(chain) - 1  # a third joint is the top of the head
     return {"head": chain[last]} | {f"neck{n}": joint for n, joint in enumerate(chain[:last], start=1)}
 
 

@@ -1,4 +1,4 @@
-"""Hands by the tree's shape: a joint from which five chains of at least three joints leave."""
+"""Recognition of hands by the tree's shape: five chains of at least three joints below one joint."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["hand_by_shape", "hand_roots", "leaf_chains"]
 
 _TOE_RATIO = 0.45  # chain length per distance from the common joint: 0.25 for toes, 0.6 or more for fingers
 
-_LONGEST = 4.0  # finger per shortest
-_TOGETHER = 0.6  # length of the mean of four fingers' directions
-_FAR = 0.35  # of a chain's length: distance of a chest from its pelvis; of a palm, from which two fingers leave, less
-_DEEPEST = 0.5  # of a row of knuckles, per its width
+_LONGEST = 4.0  # largest ratio of the longest finger to the shortest
+_TOGETHER = 0.6  # smallest length of the mean of four fingers' unit directions
+_FAR = 0.35  # distance of a chest from its pelvis, per length of a chain; smaller for fingers that share a palm joint
+_DEEPEST = 0.5  # largest depth of a row of knuckles, per its width
 
 
 def hand_roots(tree: SourceTree) -> list[int]:
-    """Joints that look like wrists."""
+    """Joints with the topology and proportions of a wrist."""
     return [j for j in range(len(tree)) if _is_wrist(tree, j)]
 
 
@@ -29,7 +29,7 @@ def _is_wrist(tree: SourceTree, joint: int) -> bool:
     if len(chains) != 5 or any(len(chain) < 3 for chain in chains):
         return False
     if any(len(leaf_chains(tree, child)) == 5 for child in tree.children[joint]):
-        return False  # a joint further down has all five
+        return False  # a descendant has all five chains, too
     at = tree.positions
     ratios = []
     for chain in chains:
@@ -43,7 +43,7 @@ def _is_wrist(tree: SourceTree, joint: int) -> bool:
 
 
 def _is_trunk(tree: SourceTree, joint: int, chains: list[list[int]]) -> bool:
-    """Whether two chains leave the joint itself and two more leave one far from it: legs a pelvis, and arms a chest."""
+    """Whether two chains leave the joint (legs at a pelvis) and two more leave one far from it (arms at a chest)."""
     at = tree.positions
     length = float(np.median([np.linalg.norm(np.diff(at[chain], axis=0), axis=1).sum() for chain in chains]))
     heads = [int(tree.parents[chain[0]]) for chain in chains]
@@ -52,9 +52,9 @@ def _is_trunk(tree: SourceTree, joint: int, chains: list[list[int]]) -> bool:
 
 
 def _are_fingers(chains: list[NDArray[np.float64]]) -> bool:
-    """Four of five chains lie side by side and point one way; rays of a star and folds of a skirt do not.
+    """Whether four of five chains lie side by side and point one way, unlike rays of a star or folds of a skirt.
 
-    Their second joints are looked at: metacarpals may begin in one place.
+    Their second joints are compared, since metacarpals may start at one point.
     """
     lengths = [float(np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()) for chain in chains]
     if min(lengths) == 0 or max(lengths) > _LONGEST * min(lengths):
@@ -71,7 +71,7 @@ def _are_fingers(chains: list[NDArray[np.float64]]) -> bool:
 
 
 def leaf_chains(tree: SourceTree, joint: int) -> list[list[int]]:
-    """For every leaf below ``joint``, the joints above it that lead to no other leaf, from the root outwards."""
+    """For every leaf below ``joint``, the joints above it that lead to no other leaf, root side first."""
     below = tree.subtree(joint)[1:]
     chains = []
     for leaf in (j for j in below if not tree.children[j]):
@@ -87,8 +87,8 @@ def leaf_chains(tree: SourceTree, joint: int) -> list[list[int]]:
 def hand_by_shape(tree: SourceTree, wrist: int) -> HandDigits:
     """The digits of the hand below ``wrist``.
 
-    The thumb is the digit with fewer joints than all others or, where counts are equal, the one that points
-    elsewhere; the fingers follow from index to pinky with growing distance from it.
+    The thumb is the digit with fewer joints than all others or, where counts are equal, the one whose direction differs
+    most; the fingers are ordered from index to pinky by distance from it.
     """
     chains = leaf_chains(tree, wrist)
     at = tree.positions
@@ -101,7 +101,7 @@ def hand_by_shape(tree: SourceTree, wrist: int) -> HandDigits:
     fingers = [c for c in range(5) if c != thumb]
     forward = unit(headings[fingers].mean(axis=0))
     middles = {c: at[chains[c]].mean(axis=0) for c in range(5)}
-    # across the palm, from where the fingers are spread
+    # direction across the palm: principal axis of the fingers' centroids
     spread = np.array([middles[c] for c in fingers]) - np.mean([middles[c] for c in fingers], axis=0)
     spread -= np.outer(spread @ forward, forward)
     lateral = np.linalg.svd(spread)[2][0]

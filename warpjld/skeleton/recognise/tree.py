@@ -1,4 +1,4 @@
-"""A joint tree as a file has it: any names, any order, any bone axes, maybe no hierarchy at all."""
+"""Joint tree of a file: any names, order and bone axes, possibly without a hierarchy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["SourceTree"]
 
 @dataclass(frozen=True, eq=False)
 class SourceTree:
-    """N joints of a file.
+    """The N joints of a file.
 
     Attributes:
         names: The file's own names.
@@ -44,16 +44,16 @@ class SourceTree:
 
     @cached_property
     def _above(self) -> list[int]:
-        """Parents as plain numbers: trees are climbed joint by joint."""
+        """Parents as Python integers, which are faster to follow one by one."""
         return [int(above) for above in self.parents]
 
     @property
     def flat(self) -> bool:
-        """Whether the hierarchy says nothing: more than four joints and none, or one, has children."""
+        """Whether the file has no real hierarchy: more than four joints, of which at most one has children."""
         return len(self) > 4 and int((np.bincount(self.parents + 1, minlength=len(self) + 1)[1:] > 0).sum()) <= 1
 
     def own_name(self, joint: int) -> str:
-        """The file's name of a joint; of several of one name the second is ``name#2``."""
+        """The file's name of a joint; the second of several with the same name is ``name#2``."""
         name = self.names[joint]
         same = [j for j, other in enumerate(self.names) if other == name]
         return name if len(same) == 1 else f"{name}#{same.index(joint) + 1}"
@@ -70,7 +70,7 @@ class SourceTree:
         return out
 
     def subtree(self, joint: int) -> list[int]:
-        """A joint and all below it, parents first."""
+        """A joint and its descendants, parents first."""
         out = [joint]
         for j in out:
             out.extend(self.children[j])
