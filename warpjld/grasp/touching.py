@@ -94,5 +94,11 @@ def _patches(
 def _some(patches: ContactPatches, rows: slice) -> ContactPatches:
     """Patches of one hand, under their segments' names."""
     names = tuple(name.partition(" ")[2] for name in patches.names[rows])
-    columns = (patches.points, patches.normals, patches.skin_normals, patches.areas, patches.vertices)
-    return ContactPatches(names, *(column[rows] for column in columns))
+    return ContactPatches(
+        names,
+        patches.points[rows],
+        patches.normals[rows],
+        patches.skin_normals[rows],
+        patches.areas[rows],
+        patches.vertices[rows],
+    )

@@ -229,7 +229,7 @@ class GraspExperiment:
         )
         coupling = self.settings.coupling if any(self.settings.coupling) else None
         closed = closer.close(poses, angles, digits=self.settings.digits, coupling=coupling)
-        touches = closed.touching().any(axis=1)
+        touches = np.asarray(closed.touching().any(axis=1))
         ended = iter(
             _Tried(closed.angles[g], one.position, one.rotation, bool(touches[g]), one.values)
             for g, one in enumerate(hands)
