@@ -17,7 +17,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from warpjld.runtime.quiet import silence_warp
-from warpjld.studio.opening import opened
+from warpjld.studio.opening import opened_document
 from warpjld.studio.room import Room
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
@@ -76,7 +76,7 @@ def main() -> None:
             text, prepare = shots[name]
             script = Path(folder) / "hand.jld"
             script.write_text(text)
-            room = Room(opened(script, Path(folder) / "out"), port=0)
+            room = Room(opened_document(script, Path(folder) / "out"), port=0)
             page = browser.new_page(viewport=SIZE)
             page.goto(room.address)
             page.get_by_text("Joints", exact=True).wait_for()

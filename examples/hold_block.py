@@ -16,7 +16,7 @@ import numpy as np
 import warpjld as wj
 from warpjld.fem.contact import Pair
 from warpjld.fem.hand import hand_laws
-from warpjld.simulation.grip.hold import PrescribedTrials
+from warpjld.simulation.grip.prescribed_trials import PrescribedTrials
 from warpjld.simulation.grip.search import Grip, GripStatus, gentlest_grip
 from warpjld.simulation.report.tactile import tactile_of_pairs
 from warpjld.simulation.report.tactile_files import draw_tactile, write_tactile

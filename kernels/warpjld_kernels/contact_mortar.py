@@ -1,4 +1,4 @@
-"""Facets that may touch, and the mortar integrals of those that do.
+"""Mortar integrals of facets that face each other.
 
 Each pair of a slave and a master quadrilateral is projected onto the slave's plane, cut (Sutherland and Hodgman) and
 integrated over the common polygon, triangle by triangle: what passes through non-matching meshes is then exact.
@@ -9,35 +9,6 @@ import warp as wp
 from warpjld_kernels.lanes import EIGHT, VECTORISED
 
 wp.set_module_options(VECTORISED)
-
-
-@wp.kernel
-def facet_pairs(
-    bvh: wp.uint64,
-    lower: wp.array(dtype=wp.vec3),
-    upper: wp.array(dtype=wp.vec3),
-    label: wp.array(dtype=wp.int32),
-    other_label: wp.array(dtype=wp.int32),
-    excluded: wp.array2d(dtype=wp.uint8),
-    starts: wp.array(dtype=wp.int32),
-    fill: wp.bool,
-    # out
-    counts: wp.array(dtype=wp.int32),
-    found: wp.array(dtype=wp.int32),
-):
-    """Master facets whose boxes meet that of each slave facet, counted, or written from ``starts`` on."""
-    facet = wp.tid()
-    mine = label[facet]
-    query = wp.bvh_query_aabb(bvh, lower[facet], upper[facet])
-    other = wp.int32(0)
-    count = wp.int32(0)
-    while wp.bvh_query_next(query, other):
-        if excluded[mine, other_label[other]] == wp.uint8(0):
-            if fill:
-                found[starts[facet] + count] = other
-            count += 1
-    if not fill:
-        counts[facet] = count
 
 
 _DOUBLE = """

@@ -12,7 +12,7 @@ from warpjld.fem.contact import Pair
 from warpjld.fem.hand import hand_laws
 from warpjld.fem.hand.fingertip import Fingertip, build_fingertip
 from warpjld.rig import Rig
-from warpjld.simulation.grip.hold import PrescribedTrials
+from warpjld.simulation.grip.prescribed_trials import PrescribedTrials
 from warpjld.simulation.grip.search import GripStatus, gentlest_grip
 
 WEIGHT, EDGE = 0.5, 0.02

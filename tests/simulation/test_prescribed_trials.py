@@ -11,7 +11,7 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.fem.contact import Pair
 from warpjld.fem.contact.obstacles.solids import Plane
-from warpjld.simulation.grip.hold import PrescribedTrials
+from warpjld.simulation.grip.prescribed_trials import PrescribedTrials
 from warpjld.simulation.grip.search import GripStatus, TrialOutcome, gentlest_grip
 from warpjld.simulation.report.tactile import tactile_of_pairs
 

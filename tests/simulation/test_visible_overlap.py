@@ -14,7 +14,7 @@ from warpjld.script.contact import run_contact
 from warpjld.simulation.display.overlap import Overlap, SurfacePart
 from warpjld.simulation.report.verdict import verdict_of
 from warpjld.simulation.report.visible_overlap import remaining_overlaps
-from warpjld.simulation.solve_frames import SolveResult
+from warpjld.simulation.solve_result import SolveResult
 
 A, B = SurfacePart("A"), SurfacePart("B")
 

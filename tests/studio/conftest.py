@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from warpjld.studio.opening import opened
+from warpjld.studio.opening import opened_document
 from warpjld.studio.room import Room
 
 _FLAGS = [
@@ -65,7 +65,7 @@ def script(tmp_path: Path) -> Path:
 def room(script: Path, kept: None) -> Iterator[Room]:
     """A studio with that script."""
     pytest.importorskip("viser", reason="viser is not installed")
-    made = Room(opened(script, script.parent / "out"), port=0)
+    made = Room(opened_document(script, script.parent / "out"), port=0)
     yield made
     made.stop()
 

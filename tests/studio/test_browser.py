@@ -11,7 +11,7 @@ import pytest
 from tests.studio.conftest import Window, until
 from warpjld.script import all_commands
 from warpjld.script.plugin import load_commands
-from warpjld.studio.opening import opened
+from warpjld.studio.opening import opened_document
 from warpjld.studio.room import Room
 
 INDEX = "left.index.base.flexion"
@@ -143,7 +143,7 @@ def test_contact_is_solved_beside_and_seen_in_colours(browser: Any, tmp_path: Pa
         "HAND LEFT BUILTIN RESOLUTION 1500\nFRAMES 0 10\nOBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\n"
         "MOVE LEFT 0 0 0.003 0\nMOVE LEFT 10 0 -0.0055 0\nFLESH LEFT INDEX ELEMENT 0.005\nPRESS 0 10 EVERY 5\n"
     )
-    room = Room(opened(script, tmp_path / "out"), port=0)
+    room = Room(opened_document(script, tmp_path / "out"), port=0)
     page = browser.new_page(viewport={"width": 900, "height": 800})
     try:
         window = Window(page, room)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from warpjld.studio.document import Document
+from warpjld.studio.document import ScriptDocument
 
 
 class Clock:
@@ -15,7 +15,7 @@ class Clock:
 
 
 def test_edits_are_undone_and_done_again_one_by_one(tmp_path: Path) -> None:
-    document = Document(tmp_path / "a.jld")
+    document = ScriptDocument(tmp_path / "a.jld")
     document.append("RATE 25")
     document.append("FRAMES 0 10")
     assert document.text == "RATE 25\nFRAMES 0 10\n"
@@ -32,7 +32,7 @@ def test_edits_are_undone_and_done_again_one_by_one(tmp_path: Path) -> None:
 
 def test_a_drag_is_one_step_of_undoing_and_a_later_drag_another(tmp_path: Path) -> None:
     clock = Clock()
-    document = Document(tmp_path / "a.jld", clock=clock)
+    document = ScriptDocument(tmp_path / "a.jld", clock=clock)
     for value in range(5):
         clock.now += 0.1
         document.edit(f"RATE {value + 1}\n", kind="rate")
@@ -45,7 +45,7 @@ def test_a_drag_is_one_step_of_undoing_and_a_later_drag_another(tmp_path: Path) 
 
 
 def test_an_edit_of_another_kind_or_after_undo_is_a_step_of_its_own(tmp_path: Path) -> None:
-    document = Document(tmp_path / "a.jld", clock=Clock())
+    document = ScriptDocument(tmp_path / "a.jld", clock=Clock())
     document.edit("a", kind=1)
     document.edit("b", kind=2)
     document.undo()
@@ -56,7 +56,7 @@ def test_an_edit_of_another_kind_or_after_undo_is_a_step_of_its_own(tmp_path: Pa
 
 
 def test_saved_whole_and_autosaved_until_saved(tmp_path: Path) -> None:
-    document = Document(tmp_path / "a.jld")
+    document = ScriptDocument(tmp_path / "a.jld")
     document.edit("RATE 25\n")
     document.autosave()
     assert document.autosaved.read_text() == "RATE 25\n"

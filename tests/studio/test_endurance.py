@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.studio.opening import opened
+from warpjld.studio.opening import opened_document
 from warpjld.studio.room import Room
 
 pytestmark = pytest.mark.slow
@@ -25,7 +25,7 @@ def test_updates_a_second_and_memory(tmp_path: Path, resolution: int, updates: i
     pytest.importorskip("viser", reason="viser is not installed")
     script = tmp_path / "a.jld"
     script.write_text(f"HAND LEFT BUILTIN RESOLUTION {resolution}\n")
-    room = Room(opened(script, tmp_path / "out"), port=0)
+    room = Room(opened_document(script, tmp_path / "out"), port=0)
     assert room.worker.settle(300)
 
     def drag(count: int) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.page.guard import Guard
-from warpjld.studio.opening import opened
+from warpjld.page.guard import RequestGuard
+from warpjld.studio.opening import opened_document
 from warpjld.studio.room import Room
 
 pytest.importorskip("viser", reason="viser is not installed")
@@ -47,7 +47,7 @@ def test_only_the_studios_own_page_connects(room: Room) -> None:
 
 
 def test_on_the_network_only_those_with_the_token_connect(script: Path) -> None:
-    room = Room(opened(script, script.parent / "out"), host="0.0.0.0", port=0)
+    room = Room(opened_document(script, script.parent / "out"), host="0.0.0.0", port=0)
     try:
         path = "/" + room.address.partition("//")[2].partition("/")[2]
         assert "?token=" in path
@@ -68,7 +68,7 @@ def test_on_the_network_only_those_with_the_token_connect(script: Path) -> None:
 
 @pytest.mark.parametrize("cookie", ["warpjld_studio=", "warpjld_studio=x; a", "=;;;", "é"])
 def test_broken_cookies_are_no_token(cookie: str) -> None:
-    guard = Guard("10.0.0.5", "secret")
+    guard = RequestGuard("10.0.0.5", "secret")
     assert guard.refuses("/", {"Host": "10.0.0.5:8080", "Cookie": cookie}) is not None
     assert guard.refuses("/?token=secret", {"Host": "10.0.0.5:8080"}) is None
     assert guard.refuses("/?token=secret", {"Host": "10.0.0.6:8080"}) is not None

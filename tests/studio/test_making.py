@@ -10,7 +10,7 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.studio.background import Background
-from warpjld.studio.document import Document
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.making import pressed
 from warpjld.studio.state import StudioState
 
@@ -27,7 +27,7 @@ def quiet(what: str, done: int, total: int) -> None:
 
 @pytest.fixture
 def state(tmp_path: Path) -> StudioState:
-    return StudioState(Document(tmp_path / "a.jld", PLATE), tmp_path / "out", within=[tmp_path])
+    return StudioState(ScriptDocument(tmp_path / "a.jld", PLATE), tmp_path / "out", within=[tmp_path])
 
 
 def test_contact_is_seen_as_it_was_solved_until_the_script_changes(state: StudioState) -> None:
@@ -48,7 +48,7 @@ def test_contact_is_seen_as_it_was_solved_until_the_script_changes(state: Studio
 
 
 def test_without_press_there_is_nothing_to_solve(tmp_path: Path) -> None:
-    state = StudioState(Document(tmp_path / "a.jld", HAND), tmp_path / "out")
+    state = StudioState(ScriptDocument(tmp_path / "a.jld", HAND), tmp_path / "out")
     with pytest.raises(InputError, match="nothing to solve"):
         pressed(state.document.text, state.copied_scene(), quiet)
 
@@ -56,7 +56,7 @@ def test_without_press_there_is_nothing_to_solve(tmp_path: Path) -> None:
 @pytest.mark.parametrize("coloring", ["domains", "stretch"])
 def test_skin_is_coloured_by_vertex(tmp_path: Path, coloring) -> None:
     text = f"{HAND}POSE LEFT FLAT 0\nPOSE LEFT FIST 10\n"
-    state = StudioState(Document(tmp_path / "a.jld", text), tmp_path / "out")
+    state = StudioState(ScriptDocument(tmp_path / "a.jld", text), tmp_path / "out")
     state.coloring = coloring
     (rest,) = state.shown()
     state.frame = 10

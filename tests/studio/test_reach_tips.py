@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpjld.script.staging import stage
-from warpjld.studio.document import Document
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.hand_pose import COARSE, coarse_angles, coarse_share
 from warpjld.studio.reach_tips import reach_tips, tips
 from warpjld.studio.state import StudioState
@@ -18,7 +18,7 @@ TEXT = "HAND LEFT BUILTIN RESOLUTION 1500\nMOVE LEFT 0 0.1 0.2 0.3\nTURN LEFT 0 
 
 @pytest.fixture
 def state(tmp_path: Path) -> StudioState:
-    return StudioState(Document(tmp_path / "a.jld", TEXT), tmp_path / "out")
+    return StudioState(ScriptDocument(tmp_path / "a.jld", TEXT), tmp_path / "out")
 
 
 def places(state: StudioState) -> dict[str, np.ndarray]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpjld.script.run_script import run_script
-from warpjld.studio.document import Document
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.key_lines import with_keys
 from warpjld.studio.state import StudioState
 
@@ -17,7 +17,7 @@ HAND = "HAND LEFT BUILTIN RESOLUTION 1500\n"
 
 @pytest.fixture
 def state(tmp_path: Path) -> StudioState:
-    return StudioState(Document(tmp_path / "a.jld", HAND), tmp_path / "out", within=[tmp_path])
+    return StudioState(ScriptDocument(tmp_path / "a.jld", HAND), tmp_path / "out", within=[tmp_path])
 
 
 def test_frames_are_those_of_a_run_bit_for_bit(state: StudioState, tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def test_everything_is_undone_in_turn(state: StudioState) -> None:
 
 def test_of_two_hands_the_chosen_one_moves(tmp_path: Path) -> None:
     text = f"{HAND}HAND LEFT BUILTIN RESOLUTION 1500 NAME OTHER\n"
-    state = StudioState(Document(tmp_path / "a.jld", text), tmp_path / "out")
+    state = StudioState(ScriptDocument(tmp_path / "a.jld", text), tmp_path / "out")
     state.choose("LEFT")
     assert state.set_angles({"left.index.base.flexion": 10})
     assert state.scene.actors["LEFT"].keyed

@@ -10,9 +10,9 @@ from warpjld.errors import InputError
 from warpjld.script import all_commands, command
 from warpjld.script.menus import MENUS, menu, place_in_menus
 from warpjld.script.parser import parse
-from warpjld.studio.document import Document
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.state import StudioState
-from warpjld.studio.syntax import Choice, Field, Keyword, Option, Text, Way, line_of, ways_of
+from warpjld.studio.syntax import Choice, Field, Keyword, Option, TextField, Way, line_of, ways_of
 
 _KNOWN = {"object": "APPLE", "actor or object": "LEFT", "actor": "LEFT", "joint": "left.index.base", "points": "TOP"}
 _ENOUGH = {"joint or ALL": "ALL", 'word, number or "text"': "word"}
@@ -24,7 +24,7 @@ def filled(fields: tuple[Field, ...], place: tuple[int, ...], options: bool) -> 
     for k, field in enumerate(fields):
         here = (*place, k)
         match field:
-            case Text(label, _, number, suffixes, _):
+            case TextField(label, _, number, suffixes, _):
                 values[here] = 1.0 if number else (_KNOWN | _ENOUGH).get(label, f"name{''.join(suffixes[:1])}")
             case Choice(_, choices, optional, _):
                 values[here] = choices[0] if options or not optional else ""
@@ -67,20 +67,22 @@ def test_ways_optional_parts_and_repeated_words_are_told_apart() -> None:
     assert ways[0] == Way(
         (
             Choice("side", ("LEFT", "RIGHT")),
-            Text("key", number=True),
-            Option("SLOW", (Text("seconds"),)),
+            TextField("key", number=True),
+            Option("SLOW", (TextField("seconds"),)),
             Choice("up or down", ("UP", "DOWN"), optional=True),
         )
     )
     assert ways[1] == Way(
-        (Text("file", quoted=True, suffixes=(".png",)), Choice("digit", ("THUMB", "INDEX"), repeated=True))
+        (TextField("file", quoted=True, suffixes=(".png",)), Choice("digit", ("THUMB", "INDEX"), repeated=True))
     )
     assert Keyword("FROM") in ways_of("GO", "GO FROM <x>")[0].fields
 
 
 def test_forms_of_commands_do_what_they_say(tmp_path: Path) -> None:
     """Lines that need nothing but a hand and a ball run as they come out of their forms."""
-    state = StudioState(Document(tmp_path / "a.jld", "HAND LEFT BUILTIN RESOLUTION 1500\nOBJECT APPLE BALL 0.05\n"))
+    state = StudioState(
+        ScriptDocument(tmp_path / "a.jld", "HAND LEFT BUILTIN RESOLUTION 1500\nOBJECT APPLE BALL 0.05\n")
+    )
     for name in ("FINGER1", "FINGER23", "WRIST", "JOINT", "MOVE", "TURN", "RATE", "FRAMES", "CAMERA", "POSE", "FLESH"):
         way = ways_of(name, all_commands()[name].syntax)[0]
         line = line_of(name, way, filled(way.fields, (), options=False))

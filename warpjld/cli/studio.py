@@ -27,13 +27,13 @@ def studio_command(
     script's folder only. Ctrl-C ends it; what is not saved is kept beside the script and found again."""
     from warpjld.runtime.quiet import silence_warp
     from warpjld.script.plugin import load_commands
-    from warpjld.studio.opening import opened
+    from warpjld.studio.opening import opened_document
     from warpjld.studio.room import Room
 
     silence_warp()
     for path in commands:
         load_commands(path)
-    room = Room(opened(script, out, device=device), host=host, port=port)
+    room = Room(opened_document(script, out, device=device), host=host, port=port)
     click.echo(f"studio: {room.address}")
     click.echo("Ctrl-C ends it")
     if browser:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
-from warpjld.grasp.edges import unique_edges
+from warpjld.grasp.edges import edges_of_sides
 
 __all__ = ["pairs_round_edge", "separate_pieces", "turned_patches"]
 
@@ -90,7 +90,7 @@ def turned_patches(
         if before == behind:
             doubtful.append(k)
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    _, edge, _ = unique_edges(ends)
+    _, edge, _ = edges_of_sides(ends)
     along = np.where(ends[:, 0] < ends[:, 1], 1, -1)
     owner = np.repeat(patch, 3)
     for k in doubtful:

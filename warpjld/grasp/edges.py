@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["unique_edges"]
+__all__ = ["edges_of_sides"]
 
 
-def unique_edges(
+def edges_of_sides(
     sides: NDArray[np.integer],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Every edge once, as ``np.unique`` along the rows in a tenth of its time.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
-from warpjld.grasp.edges import unique_edges
+from warpjld.grasp.edges import edges_of_sides
 
 __all__ = ["face_normals", "feature_normals"]
 
@@ -26,7 +26,7 @@ def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> 
     normal = face_normals(corner)
     out = np.empty((len(faces), 7, 3))
     out[:, 0] = normal
-    edges, place, _ = unique_edges(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2))
+    edges, place, _ = edges_of_sides(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2))
     total = np.zeros((len(edges), 3))
     np.add.at(total, place, np.repeat(normal, 3, axis=0))
     out[:, 1:4] = total[place.reshape(-1, 3)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.edges import unique_edges
+from warpjld.grasp.edges import edges_of_sides
 
 __all__ = ["FinerSkin"]
 
@@ -31,7 +31,7 @@ class FinerSkin:
         self.faces, self.parents = faces.astype(np.int32), np.arange(len(vertices))
         self._middles: list[NDArray[np.integer]] = []
         for _ in range(rounds):
-            edges, place, _ = unique_edges(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+            edges, place, _ = edges_of_sides(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
             a, b, c = self.faces.T
             ab, bc, ca = (place.reshape(-1, 3) + len(self.parents)).T
             cut = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.edges import unique_edges
+from warpjld.grasp.edges import edges_of_sides
 from warpjld.grasp.objects import GraspObject
 
 __all__ = ["outline_points"]
@@ -19,7 +19,7 @@ def outline_points(thing: GraspObject, spacing: float = 2e-3) -> NDArray[np.floa
     An edge is sharp where its faces' normals differ by 10° or more, or where it has one face only. Inside flat parts no
     point is needed: what touches them are the other surface's vertices.
     """
-    first, place, uses = unique_edges(thing.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+    first, place, uses = edges_of_sides(thing.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
     total = np.zeros((len(first), 3))
     np.add.at(total, place, np.repeat(thing.normals, 3, axis=0))
     # |n₁ + n₂|² = 2 + 2 cos

@@ -16,14 +16,14 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-__all__ = ["Guard", "guarding"]
+__all__ = ["RequestGuard", "guarding"]
 
 _COOKIE = "warpjld_studio"
 _HERE = ("127.0.0.1", "localhost", "::1")
 
 
 @dataclass(frozen=True)
-class Guard:
+class RequestGuard:
     """Says which requests are answered.
 
     Attributes:
@@ -85,7 +85,7 @@ def _same(given: str, token: str) -> bool:
 
 
 @contextmanager
-def guarding(guard: Guard) -> Iterator[None]:
+def guarding(guard: RequestGuard) -> Iterator[None]:
     """A server of viser's that is made inside asks this guard first: viser has no place of its own for that, so what it
     hands to ``websockets`` is changed on the way."""
     import websockets.asyncio.server as websockets_server
@@ -103,7 +103,7 @@ def guarding(guard: Guard) -> Iterator[None]:
         websockets_server.serve = original
 
 
-def _first(guard: Guard, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+def _first(guard: RequestGuard, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     """A handler of requests that lets the guard look at them first."""
 
     def process(connection: Any, request: Any) -> Any:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.files.whole_file import whole_file
-from warpjld.page.guard import Guard
+from warpjld.page.guard import RequestGuard
 from warpjld.page.server import add_colored, add_surface, guarded_server, look, stop
 
 __all__ = ["PageRecording"]
@@ -41,7 +41,7 @@ class PageRecording:
 
     def __enter__(self) -> Self:
         # the recorder is a part of viser's server: one that answers nobody
-        nobody = Guard("127.0.0.1", secrets.token_urlsafe(24))
+        nobody = RequestGuard("127.0.0.1", secrets.token_urlsafe(24))
         self._server = guarded_server(nobody, 0, f"the page '{self.path.name}'")
         return self
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import MissingExtraError
 from warpjld.page.colored_glb import colored_glb
-from warpjld.page.guard import Guard, guarding
+from warpjld.page.guard import RequestGuard, guarding
 
 __all__ = ["FIELD", "add_colored", "add_surface", "guarded_server", "look", "rgb", "stop"]
 
@@ -19,7 +19,7 @@ FIELD = 0.6
 """Vertical opening of the camera [rad]."""
 
 
-def guarded_server(guard: Guard, port: int, purpose: str) -> Any:
+def guarded_server(guard: RequestGuard, port: int, purpose: str) -> Any:
     """viser's server on the guard's host, at a port or the next that is free (0: any), with an empty stage.
 
     Raises:

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from warpjld.kernel_cache import remove_damaged_kernels
+from warpjld.runtime.kernel_cache import remove_damaged_kernels
 
 __all__ = ["silence_warp"]
 

@@ -20,7 +20,7 @@ from warpjld.simulation.solve.fallen import (
 )
 from warpjld.simulation.solve.falling import falling_names, follow_falls
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
-from warpjld.simulation.solve_frames import SolveResult
+from warpjld.simulation.solve_result import SolveResult
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 
 __all__ = ["after_contact", "before_contact", "rests_rigidly"]

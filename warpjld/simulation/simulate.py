@@ -49,7 +49,8 @@ from warpjld.simulation.solve.checks import check_model, check_specification
 from warpjld.simulation.solve.identity import identity_of
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.solve.start_frame import StartFrame
-from warpjld.simulation.solve_frames import Progress, SolveResult, solve_frames
+from warpjld.simulation.solve_frames import Progress, solve_frames
+from warpjld.simulation.solve_result import SolveResult
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 
 __all__ = ["KEPT", "Keep", "Simulation", "VisiblePressure", "simulate"]

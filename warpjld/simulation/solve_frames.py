@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,81 +19,25 @@ from warpjld.simulation.grip.kept import grip_content, restored_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
-from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits, Stop
+from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits
 from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
 from warpjld.simulation.solve.untouched import solve_untouched
+from warpjld.simulation.solve_result import KnownEquilibrium, SolveResult
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, SolveSpecification
 
-__all__ = ["KnownEquilibrium", "Progress", "Save", "SolveResult", "solve_frames"]
+__all__ = ["Progress", "Save", "solve_frames"]
 
 Progress = Callable[[str, int, int], None]
 """Told what is being done, how much of it is done, and how much there is."""
-
-
-@dataclass(frozen=True, eq=False)
-class KnownEquilibrium:
-    """A frame's equilibrium, and what it belongs to.
-
-    Attributes:
-        model: Everything, with the edits that held there.
-        history: What was known before it.
-        solution: Its last instant, without what touches.
-    """
-
-    model: ContactModel
-    history: History
-    solution: ContactSolution
 
 
 Watch = Callable[[ContactModel, SolvedFrame], str | None]
 
 Save = Callable[[CheckpointFile], bool]
 """Saves what is solved so far; False where there is nothing to go on from."""
-
-
-@dataclass(frozen=True, eq=False)
-class SolveResult:
-    """Frames that were solved, and how it ended.
-
-    Attributes:
-        status: Of the last load step.
-        message: For people.
-        model: What was solved, with all edits.
-        frames: In order.
-        resumed: How many of them an earlier run left.
-        missed: Touches between frames that no frame shows.
-        edits: Angles that searches and corrections gave, in order.
-        grips: What came of searches for a grip.
-        corrections: What came of corrections.
-        stops: Digits that closed no farther.
-        tight: Bones that came nearest to objects, of every digit and object the nearest.
-        equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
-        released: Frame after which what nothing holds any more falls, if it does: contact is not solved from there on.
-        interrupted: Whether Ctrl-C ended it.
-    """
-
-    status: SolveStatus
-    message: str
-    model: ContactModel
-    frames: tuple[SolvedFrame, ...] = ()
-    resumed: int = 0
-    missed: tuple[MissedContact, ...] = ()
-    edits: tuple[AngleEdit, ...] = ()
-    grips: tuple[FoundGrip, ...] = ()
-    corrections: tuple[CorrectedFrame, ...] = ()
-    stops: tuple[Stop, ...] = ()
-    tight: tuple[tuple[float, TightBone], ...] = ()
-    equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
-    released: float | None = None
-    interrupted: bool = False
-
-    @property
-    def start(self) -> float:
-        """Frame of time 0."""
-        return self.model.start
 
 
 def solve_frames(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-__all__ = ["Background", "Progress"]
+__all__ = ["Background", "JobProgress"]
 
-Progress = Callable[[str, int, int], None]
+JobProgress = Callable[[str, int, int], None]
 
 
 class _CancelledError(BaseException):
@@ -32,7 +32,7 @@ class Background:
         self.step = ""
 
     def start(
-        self, what: str, work: Callable[[Progress], object], ended: Callable[[object, BaseException | None], None]
+        self, what: str, work: Callable[[JobProgress], object], ended: Callable[[object, BaseException | None], None]
     ) -> bool:
         """Begin; False where something is being done already. ``ended`` gets the result, or what was raised, or
         neither where it was cancelled."""
@@ -48,7 +48,9 @@ class Background:
         """End the work at the next step that it tells of."""
         self._cancel.set()
 
-    def _run(self, work: Callable[[Progress], object], ended: Callable[[object, BaseException | None], None]) -> None:
+    def _run(
+        self, work: Callable[[JobProgress], object], ended: Callable[[object, BaseException | None], None]
+    ) -> None:
         result, error = None, None
         try:
             result = work(self._progress)

@@ -10,7 +10,7 @@ from pathlib import Path
 from warpjld.files.text_file import read_text
 from warpjld.files.whole_file import whole_file
 
-__all__ = ["Document"]
+__all__ = ["ScriptDocument"]
 
 _TOGETHER = 1.0  # seconds within which edits of one kind are one step of undoing
 _MOST_STEPS = 1000
@@ -24,7 +24,7 @@ class _Step:
     kind: Hashable
 
 
-class Document:
+class ScriptDocument:
     """A script being written.
 
     Edits of one ``kind`` that follow one another closely (a slider being dragged, a word being typed) are undone
@@ -46,7 +46,7 @@ class Document:
         self._last = -_TOGETHER
 
     @classmethod
-    def open(cls, path: Path) -> Document:
+    def open(cls, path: Path) -> ScriptDocument:
         """The script in a file (UTF-8).
 
         Raises:

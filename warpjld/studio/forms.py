@@ -5,7 +5,7 @@ from __future__ import annotations
 from warpjld.script.registry import Command
 from warpjld.script.scene import Scene
 from warpjld.script.statements import MacroDefinition
-from warpjld.studio.syntax import Text, Way, ways_of
+from warpjld.studio.syntax import TextField, Way, ways_of
 
 __all__ = ["first_value", "known_names", "ways_of_command", "ways_of_macro"]
 
@@ -20,10 +20,10 @@ def ways_of_command(command: Command) -> tuple[Way, ...]:
 
 def ways_of_macro(macro: MacroDefinition) -> tuple[Way, ...]:
     """The one way to call a macro: a value for each parameter."""
-    return (Way(tuple(Text(word.text.lower()) for word in macro.parameters)),)
+    return (Way(tuple(TextField(word.text.lower()) for word in macro.parameters)),)
 
 
-def known_names(field: Text, scene: Scene) -> list[str]:
+def known_names(field: TextField, scene: Scene) -> list[str]:
     """Names on stage that a value may be; empty where it may be anything."""
     actors, objects = [*scene.actors], [*scene.props]
     match field.label:
@@ -40,7 +40,7 @@ def known_names(field: Text, scene: Scene) -> list[str]:
             return []
 
 
-def first_value(field: Text, frame: float) -> float:
+def first_value(field: TextField, frame: float) -> float:
     """What a number is before it is typed: the frame that is shown, where it is a frame, or one a while later."""
     if field.label in _LAST:
         return frame + _LONG

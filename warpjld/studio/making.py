@@ -15,7 +15,7 @@ from warpjld.script.staging import frame_numbers
 if TYPE_CHECKING:
     from warpjld.simulation.report.table import ContactRow
     from warpjld.simulation.simulate import Simulation
-    from warpjld.studio.background import Progress
+    from warpjld.studio.background import JobProgress
 
 __all__ = ["Pressed", "made", "pressed"]
 
@@ -41,7 +41,7 @@ class Pressed:
         return [row for row in every if row.frame == near and row.force_n > 0.0]
 
 
-def pressed(text: str, scene: Scene, progress: Progress) -> Pressed:
+def pressed(text: str, scene: Scene, progress: JobProgress) -> Pressed:
     """Do what PRESS asks for.
 
     Raises:
@@ -53,6 +53,6 @@ def pressed(text: str, scene: Scene, progress: Progress) -> Pressed:
     return Pressed(text, scene, run_contact(scene, scene.folder, progress))
 
 
-def made(scene: Scene, script: Path, progress: Progress, device: str = "cpu") -> dict[str, Any]:
+def made(scene: Scene, script: Path, progress: JobProgress, device: str = "cpu") -> dict[str, Any]:
     """Make the script's files in the output folder; the summary."""
     return run_scene(scene, scene.folder, script=script, device=device, progress=progress)

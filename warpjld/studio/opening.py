@@ -7,15 +7,15 @@ from pathlib import Path
 
 from warpjld.errors import InputError, WarpjldError
 from warpjld.files.text_file import read_text
-from warpjld.studio.document import Document
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.state import StudioState
 
-__all__ = ["opened"]
+__all__ = ["opened_document"]
 
 _NEW = "HAND LEFT BUILTIN\n"
 
 
-def opened(path: Path | None, folder: Path, *, device: str = "cpu") -> StudioState:
+def opened_document(path: Path | None, folder: Path, *, device: str = "cpu") -> StudioState:
     """A studio with a script (.jld), a rig, or the built-in hand. Files may be read from the script's folder, and those
     that the script as it is opened names, wherever they are.
 
@@ -23,13 +23,13 @@ def opened(path: Path | None, folder: Path, *, device: str = "cpu") -> StudioSta
         InputError: There is no such file, or the rig cannot be read.
     """
     if path is None:
-        document = Document(Path("untitled.jld").resolve(), _NEW)
+        document = ScriptDocument(Path("untitled.jld").resolve(), _NEW)
     elif not path.is_file():
         raise InputError("no such file", path=path)
     elif path.suffix.lower() == ".jld":
-        document = Document.open(path.resolve())
+        document = ScriptDocument.open(path.resolve())
     else:
-        document = Document(path.resolve().with_suffix(".jld"), _staging(path))
+        document = ScriptDocument(path.resolve().with_suffix(".jld"), _staging(path))
     if document.autosaved.is_file() and (kept := read_text(document.autosaved)) != document.text:
         document.edit(kept)  # what was not saved when the studio ended; undoing it brings back the file's text
     return StudioState(document, folder, within=[document.path.parent, *_named(document)], device=device)
@@ -45,7 +45,7 @@ def _staging(path: Path) -> str:
     return f'BODY "{path.name}"\n' if body else f'HAND {sides[0].upper()} "{path.name}"\n'
 
 
-def _named(document: Document) -> list[Path]:
+def _named(document: ScriptDocument) -> list[Path]:
     """Files that a script reads as it stands."""
     from warpjld.studio.performance import Performance
 

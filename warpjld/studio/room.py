@@ -9,7 +9,7 @@ from collections.abc import Callable, Hashable
 from typing import Any
 
 from warpjld.errors import WarpjldError
-from warpjld.page.guard import Guard
+from warpjld.page.guard import RequestGuard
 from warpjld.page.server import guarded_server, stop
 from warpjld.studio.panels.curves import CurvesPanel
 from warpjld.studio.panels.drag import DragPanel
@@ -47,7 +47,7 @@ class Room:
         self.state = state
         local = host in (LOCAL, "localhost", "::1")
         token = None if local else secrets.token_urlsafe(24)
-        self.server = guarded_server(Guard(host, token), port, "the studio")
+        self.server = guarded_server(RequestGuard(host, token), port, "the studio")
         self.worker = Worker(self.refresh, self._failed)
         self.panels: list[Any] = []
         self._kept = state.document.text

@@ -12,7 +12,7 @@ from warpjld.errors import InputError, WarpjldError
 from warpjld.script.scene import Actor, Scene
 from warpjld.script.staging import frame_numbers
 from warpjld.skeleton import CHANNELS
-from warpjld.studio.document import Document
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.key_lines import number, with_keys
 from warpjld.studio.making import Pressed
 from warpjld.studio.performance import Performance
@@ -45,7 +45,7 @@ class StudioState:
 
     def __init__(
         self,
-        document: Document,
+        document: ScriptDocument,
         folder: Path = Path("out"),
         *,
         within: Sequence[Path] | None = None,
@@ -202,7 +202,7 @@ class StudioState:
             self._run()
         return done
 
-    def open(self, document: Document) -> None:
+    def open(self, document: ScriptDocument) -> None:
         """Another script."""
         self.document = document
         self.frame, self._actor = 0.0, None

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["Choice", "Field", "Option", "Text", "Way", "line_of", "ways_of"]
+__all__ = ["Choice", "Field", "Option", "TextField", "Way", "line_of", "ways_of"]
 
 _TOKEN = re.compile(r'"<[^>]*>[^"\s]*"|<[^>]*>|\[|\]|…|[^\s\[\]<>"…]+')
 _WAYS = re.compile(r",? or (?=[A-Z_0-9]+ )|, (?=[A-Z_0-9]+ [<\"A-Z])")
@@ -23,7 +23,7 @@ _NUMBER = re.compile(
 
 
 @dataclass(frozen=True)
-class Text:
+class TextField:
     """A value to type.
 
     Attributes:
@@ -66,7 +66,7 @@ class Keyword:
     word: str
 
 
-Field = Text | Choice | Option | Keyword
+Field = TextField | Choice | Option | Keyword
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Way:
                     words.append(word)
                 case Choice(_, options, False, _):
                     words.append("/".join(options[:3]))
-                case Text(label, _, _, _, _):
+                case TextField(label, _, _, _, _):
                     words.append(f"<{label}>")
                 case Option(keyword, _):
                     if keyword:
@@ -145,13 +145,13 @@ def _fields(tokens: list[str], k: int) -> tuple[list[Field], int]:
 def _field(token: str) -> Field:
     if token.startswith('"'):
         inside, _, after = token.strip('"').removeprefix("<").partition(">")
-        return Text(inside, quoted=True, suffixes=tuple(part for part in after.split("/") if part.startswith(".")))
+        return TextField(inside, quoted=True, suffixes=tuple(part for part in after.split("/") if part.startswith(".")))
     if token.startswith("<"):
         inside = token.strip("<>")
         options = inside.split("/")
         if len(options) > 1 and all(re.fullmatch(r"[A-Z][A-Z0-9_\-]*", option) for option in options):
             return Choice(_called(options), tuple(options))
-        return Text(inside, number=bool(_NUMBER.search(inside)) and " or " not in inside)
+        return TextField(inside, number=bool(_NUMBER.search(inside)) and " or " not in inside)
     options = token.split("/")
     if len(options) > 1 and all(options):
         return Choice(_called(options), tuple(options))
@@ -176,8 +176,8 @@ def _option(inner: list[Field]) -> Field:
 
 def _repeated(fields: list[Field]) -> list[Field]:
     match fields:
-        case [*before, Text(label, quoted, number, suffixes, _)]:
-            return [*before, Text(label, quoted, number, suffixes, repeated=True)]
+        case [*before, TextField(label, quoted, number, suffixes, _)]:
+            return [*before, TextField(label, quoted, number, suffixes, repeated=True)]
         case [*before, Choice(label, options, optional, _)]:
             return [*before, Choice(label, options, optional, repeated=True)]
         case _:
@@ -209,7 +209,7 @@ def _words(fields: tuple[Field, ...], place: tuple[int, ...], values: Mapping[tu
                     words += _words(inner, here, values)
             case Choice():
                 words += [str(values[here])] if values.get(here) else []
-            case Text(_, quoted, _, _, _):
+            case TextField(_, quoted, _, _, _):
                 value = values.get(here, "")
                 text = f"{value:.10g}" if isinstance(value, float | int) else str(value).strip()
                 words += [f'"{text}"'] if quoted else [text] if text else []

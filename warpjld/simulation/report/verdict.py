@@ -15,7 +15,7 @@ from warpjld.simulation.report.visible_overlap import RemainingOverlap
 from warpjld.simulation.solve.digit_loads import CRUSHING
 
 if TYPE_CHECKING:
-    from warpjld.simulation.solve_frames import SolveResult
+    from warpjld.simulation.solve_result import SolveResult
 
 __all__ = ["CRUSHED", "RELEASED", "ContactVerdict", "verdict_of"]
 

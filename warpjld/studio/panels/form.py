@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from warpjld.studio.forms import first_value, known_names
-from warpjld.studio.syntax import Choice, Field, Option, Text, Way, line_of
+from warpjld.studio.syntax import Choice, Field, Option, TextField, Way, line_of
 
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
@@ -70,13 +70,13 @@ class FormWindow:
                     choices = (_NONE, *options) if optional else options
                     self._keep(here, self._gui.add_dropdown(label, choices, initial_value=choices[0]))
                 case Option(keyword, inner):
-                    label = keyword.lower() or " ".join(f.label for f in inner if isinstance(f, Text | Choice))
+                    label = keyword.lower() or " ".join(f.label for f in inner if isinstance(f, TextField | Choice))
                     self._keep(here, self._gui.add_checkbox(label or "more", False))
                     self._add(inner, here)
-                case Text():
+                case TextField():
                     self._keep(here, self._value(field))
 
-    def _value(self, field: Text) -> Any:
+    def _value(self, field: TextField) -> Any:
         label = field.label if not field.suffixes else f"{field.label} ({', '.join(field.suffixes)})"
         names = known_names(field, self._room.state.scene)
         if names:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
 from warpjld.files.names import check_name
-from warpjld.studio.background import Background, Progress
-from warpjld.studio.document import Document
+from warpjld.studio.background import Background, JobProgress
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.making import made, pressed
 
 if TYPE_CHECKING:
@@ -91,11 +91,11 @@ class WorkPanel:
                 case "save":
                     state.messages.append(f"saved {state.document.save(path).name}")
                 case "open":
-                    state.open(Document.open(path))
+                    state.open(ScriptDocument.open(path))
                 case _:
                     if path.exists():
                         raise InputError(f"there is a file {path.name} already: give the new script another name")
-                    state.open(Document(path, "HAND LEFT BUILTIN\n"))
+                    state.open(ScriptDocument(path, "HAND LEFT BUILTIN\n"))
 
         self._room.post(act)
 
@@ -110,7 +110,7 @@ class WorkPanel:
         state = self._room.state
         scene, script = state.copied_scene(), state.document.path
 
-        def work(progress: Progress) -> object:
+        def work(progress: JobProgress) -> object:
             return made(scene, script, progress)
 
         def told(result: Any) -> None:

@@ -10,7 +10,7 @@ from warpjld.errors import WarpjldError
 from warpjld.runtime.processes import THREAD_VARIABLES
 from warpjld.study.cluster.node import MATCHING, Sent, ping, trial_bytes
 
-__all__ = ["LostNodeError", "LostWorkerError", "Node", "Nodes", "differing"]
+__all__ = ["ClusterNode", "LostNodeError", "LostWorkerError", "Nodes", "differing"]
 
 _ANSWER = 120.0  # seconds that a machine has to start a worker and answer
 _STILL_THERE = 15.0  # likewise, where one has just lost a worker
@@ -26,7 +26,7 @@ class LostNodeError(Exception):
 
 
 @dataclass
-class Node:
+class ClusterNode:
     """One machine.
 
     Attributes:
@@ -75,15 +75,16 @@ class Nodes:
         how = {"num_cpus": 1, "max_retries": 0, "runtime_env": {"env_vars": variables}}
         self._trial, self._ping = ray.remote(**how)(trial_bytes), ray.remote(**how)(ping)
         self._arguments = (key, [held], sent)
-        self.all: dict[str, Node] = {}
+        self.all: dict[str, ClusterNode] = {}
 
-    def new(self) -> list[Node]:
+    def new(self) -> list[ClusterNode]:
         """Machines that were not there before; they are known from now on, and have answered a ping."""
         import ray
 
         found = [one for one in ray.nodes() if one["Alive"] and one["NodeID"] not in self.all]
         nodes = [
-            Node(one["NodeID"], one["NodeManagerHostname"], int(one["Resources"].get("CPU", 0.0))) for one in found
+            ClusterNode(one["NodeID"], one["NodeManagerHostname"], int(one["Resources"].get("CPU", 0.0)))
+            for one in found
         ]
         nodes = sorted((node for node in nodes if node.cpus > 0), key=lambda node: node.key != self._own())
         asked = [(node, self._on(self._ping, node).remote()) for node in nodes]
@@ -93,18 +94,18 @@ class Nodes:
             self.all[node.key] = node
         return nodes
 
-    def alive(self) -> list[Node]:
+    def alive(self) -> list[ClusterNode]:
         """Machines that take trials."""
         import ray
 
         there = {one["NodeID"] for one in ray.nodes() if one["Alive"]}
         return [node for node in self.all.values() if node.used and node.key in there]
 
-    def submit(self, trial: int, node: Node) -> Any:
+    def submit(self, trial: int, node: ClusterNode) -> Any:
         """Hand a trial to a machine; returns the reference of its bytes."""
         return self._on(self._trial, node).remote(*self._arguments, trial)
 
-    def result(self, reference: Any, node: Node) -> bytes:
+    def result(self, reference: Any, node: ClusterNode) -> bytes:
         """Bytes of a trial, waited for.
 
         Raises:
@@ -129,7 +130,7 @@ class Nodes:
             raise LostNodeError from error
         return content
 
-    def _lives(self, node: Node) -> bool:
+    def _lives(self, node: ClusterNode) -> bool:
         """Whether a machine that has just lost a worker is there: it answers, or Ray still has not missed it."""
         import ray
 
@@ -144,7 +145,7 @@ class Nodes:
                 return True
         return True
 
-    def _answer(self, reference: Any, node: Node, patience: float) -> dict[str, Any]:
+    def _answer(self, reference: Any, node: ClusterNode, patience: float) -> dict[str, Any]:
         import ray
 
         try:
@@ -160,7 +161,7 @@ class Nodes:
         return str(ray.get_runtime_context().get_node_id())
 
     @staticmethod
-    def _on(remote: Any, node: Node) -> Any:
+    def _on(remote: Any, node: ClusterNode) -> Any:
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
         return remote.options(scheduling_strategy=NodeAffinitySchedulingStrategy(node_id=node.key, soft=False))
@@ -171,7 +172,7 @@ def _first_line(error: object) -> str:
     return text[-1][:200] if text else type(error).__name__
 
 
-def differing(node: Node, own: dict[str, Any]) -> str:
+def differing(node: ClusterNode, own: dict[str, Any]) -> str:
     """Versions of a machine that are not this one's, as words; "" where none."""
     return ", ".join(
         f"{name} {node.versions.get(name)} there, {own.get(name)} here"

@@ -17,7 +17,7 @@ from warpjld.runtime.processes import LIVES
 from warpjld.runtime.threads import cores
 from warpjld.study.cluster.inputs import sent_inputs
 from warpjld.study.cluster.node import ping
-from warpjld.study.cluster.nodes import LostNodeError, LostWorkerError, Node, Nodes, differing
+from warpjld.study.cluster.nodes import ClusterNode, LostNodeError, LostWorkerError, Nodes, differing
 from warpjld.study.experiment import Experiment
 from warpjld.study.pool import TrialWork
 from warpjld.study.shards import Shard, Shards
@@ -135,7 +135,7 @@ class _Study:
         self._experiment, self._waiting, self._nodes, self._most = experiment, waiting, nodes, most
         self._shards, self._work = Shards(folder), TrialWork(experiment, folder)
         self._allow_mixed, self._done, self._note = allow_mixed, done, note
-        self._out: dict[Any, tuple[int, Node]] = {}
+        self._out: dict[Any, tuple[int, ClusterNode]] = {}
         self._suspects: list[int] = []
         self._looked = 0.0
         self._own = ping()["versions"]
@@ -163,7 +163,7 @@ class _Study:
             else:
                 self._try(node)
 
-    def _try(self, node: Node) -> None:
+    def _try(self, node: ClusterNode) -> None:
         """Canary trials on a machine: they are kept where they were missing, and compared where they were not."""
         count = self._experiment.trials
         for trial in sorted({k * count // _CANARIES for k in range(_CANARIES)}):
@@ -187,7 +187,7 @@ class _Study:
                 node.why = said
                 self._note(f"{node}: {said}; it takes part all the same")
 
-    def _refuse(self, node: Node, why: str) -> None:
+    def _refuse(self, node: ClusterNode, why: str) -> None:
         node.used, node.why = False, why
         self._note(f"{node} is not used: {why}")
 
@@ -203,7 +203,7 @@ class _Study:
             self._out[self._nodes.submit(trial, node)] = (trial, node)
             node.busy += 1
 
-    def _usable(self) -> list[Node]:
+    def _usable(self) -> list[ClusterNode]:
         """Machines that take trials; waits for one where none is left."""
         began = time.monotonic()
         while not (alive := self._nodes.alive()):
@@ -244,7 +244,7 @@ class _Study:
             return
         self._done(trial, self._work.bury(trial))
 
-    def _keep(self, trial: int, content: bytes, node: Node) -> None:
+    def _keep(self, trial: int, content: bytes, node: ClusterNode) -> None:
         try:
             self._shards.put(trial, content)
         except OSError as error:

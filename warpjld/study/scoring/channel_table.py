@@ -18,7 +18,7 @@ from warpjld.errors import InputError
 from warpjld.files.reading import reading
 from warpjld.files.text_file import read_text
 from warpjld.study.scoring.given import GivenGrasp, quaternion
-from warpjld.study.scoring.reading_grasps import GraspReading, number
+from warpjld.study.scoring.reading_grasps import GraspReading, number_in
 
 __all__ = ["read_channel_table"]
 
@@ -57,10 +57,10 @@ def read_channel_table(path: Path, how: GraspReading) -> list[GivenGrasp]:
 
 
 def _grasp(cells: dict[str, str], line: int, how: GraspReading) -> GivenGrasp:
-    position = np.array([number(cells[name], name) for name in _PLACE])
-    turn = quaternion(np.array([number(cells[name], name) for name in _TURN]), "qw, qx, qy, qz")
+    position = np.array([number_in(cells[name], name) for name in _PLACE])
+    turn = quaternion(np.array([number_in(cells[name], name) for name in _TURN]), "qw, qx, qy, qz")
     angles = {name: cell for name, cell in cells.items() if name not in (*_NEEDED, *_OTHER) and cell}
-    joints = {name: float(np.radians(number(cell, name))) for name, cell in angles.items()}
+    joints = {name: float(np.radians(number_in(cell, name))) for name, cell in angles.items()}
     more: dict[str, Any] = {"hand": cells.get("hand", "")}
-    more |= {key: number(cells[key], key, above=0.0) for key in ("scale", "friction", "mass") if cells.get(key)}
+    more |= {key: number_in(cells[key], key, above=0.0) for key in ("scale", "friction", "mass") if cells.get(key)}
     return how.posed(cells.get("name") or f"line {line}", cells["object"], position, turn, joints, **more)

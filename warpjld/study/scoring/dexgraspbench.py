@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.grasp.objects import Places
 from warpjld.study.scoring.given import GivenGrasp, quaternion
-from warpjld.study.scoring.reading_grasps import GraspReading, number
+from warpjld.study.scoring.reading_grasps import GraspReading, number_in
 
 __all__ = ["dexgraspbench_grasps", "is_dexgraspbench"]
 
@@ -54,12 +54,12 @@ def dexgraspbench_grasps(content: Mapping[str, Any], name: str, how: GraspReadin
     if not isinstance(names, list | tuple | np.ndarray) or not all(isinstance(name, str) for name in names):
         raise InputError("joint_names: want a list of names")
     more: dict[str, Any] = {"hand": str(content.get("hand", ""))}
-    more |= {key: number(content[key], key, above=0.0) for key in ("friction", "mass") if key in content}
+    more |= {key: number_in(content[key], key, above=0.0) for key in ("friction", "mass") if key in content}
     grasps = []
     for k, pose in enumerate(poses):
         called = name if count == 1 else f"{name}#{k}"
         place = places[k if len(places) > 1 else 0]
-        scale = number(scales[k if len(scales) > 1 else 0], "obj_scale", above=0.0)
+        scale = number_in(scales[k if len(scales) > 1 else 0], "obj_scale", above=0.0)
         stands = Places.of(place[:3], quaternion(place[3:], "obj_pose"))
         turn = quaternion(pose[3:7], f"{called}: grasp_qpos")
         joints = how.names.named(pose[7:].tolist(), [str(one) for one in names])

@@ -17,7 +17,7 @@ from warpjld.errors import InputError, MissingExtraError
 from warpjld.files.reading import reading
 from warpjld.files.text_file import read_text
 from warpjld.study.scoring.given import GivenGrasp, quaternion
-from warpjld.study.scoring.reading_grasps import GraspReading, number
+from warpjld.study.scoring.reading_grasps import GraspReading, number_in
 
 __all__ = ["read_isaac"]
 
@@ -32,7 +32,7 @@ def read_isaac(path: Path, how: GraspReading) -> list[GivenGrasp]:
     content = _loaded(path)
     if content.get("format") != "isaac_grasp":
         raise InputError("want format: isaac_grasp", path=path)
-    if number(content.get("format_version"), "format_version") != 1.0:
+    if number_in(content.get("format_version"), "format_version") != 1.0:
         raise InputError(f"isaac_grasp version {content['format_version']} is not read; want 1.0", path=path)
     own = content.get("warpjld")
     own = own if isinstance(own, Mapping) else {}
@@ -41,10 +41,10 @@ def read_isaac(path: Path, how: GraspReading) -> list[GivenGrasp]:
     frictions = own.get("friction") if isinstance(own.get("friction"), Mapping) else {}
     same: dict[str, Any] = {
         "hand": str(own.get("hand", "")),
-        "scale": number(own.get("scale", 1.0), "scale", above=0.0),
+        "scale": number_in(own.get("scale", 1.0), "scale", above=0.0),
     }
     if "mass" in own:
-        same["mass"] = number(own["mass"], "mass", above=0.0)
+        same["mass"] = number_in(own["mass"], "mass", above=0.0)
     grasps = content.get("grasps")
     if not isinstance(grasps, Mapping) or not grasps:
         raise InputError("has no grasps", path=path)
@@ -53,7 +53,7 @@ def read_isaac(path: Path, how: GraspReading) -> list[GivenGrasp]:
         for name, grasp in grasps.items():
             more = dict(same)
             if isinstance(frictions, Mapping) and name in frictions:
-                more["friction"] = number(frictions[name], f"friction.{name}", above=0.0)
+                more["friction"] = number_in(frictions[name], f"friction.{name}", above=0.0)
             found.append(_grasp(str(name), grasp, thing, how, more))
     except InputError as error:
         raise InputError(error.message, path=path) from None
@@ -84,7 +84,7 @@ def _grasp(name: str, grasp: Any, thing: str, how: GraspReading, more: dict[str,
         raise InputError(f"{name}: orientation: want w and xyz")
     if not isinstance(joints, Mapping):
         raise InputError(f"{name}: cspace_position: want joints by name")
-    position = np.array([number(value, f"{name}: position") for value in place])
-    parts = [number(value, f"{name}: orientation") for value in (turn["w"], *turn["xyz"])]
-    angles = {str(joint): number(value, f"{name}: {joint}") for joint, value in joints.items()}
+    position = np.array([number_in(value, f"{name}: position") for value in place])
+    parts = [number_in(value, f"{name}: orientation") for value in (turn["w"], *turn["xyz"])]
+    angles = {str(joint): number_in(value, f"{name}: {joint}") for joint, value in joints.items()}
     return how.posed(name, thing, position, quaternion(np.array(parts), f"{name}: orientation"), angles, **more)

@@ -22,7 +22,7 @@ from warpjld.files.text_file import read_json
 from warpjld.io.obj_file import read_obj
 from warpjld.rig import Rig
 from warpjld.study.scoring.given import GivenGrasp
-from warpjld.study.scoring.reading_grasps import GraspReading, number
+from warpjld.study.scoring.reading_grasps import GraspReading, number_in
 
 __all__ = ["FORMAT", "LISTED", "read_meshes"]
 
@@ -52,7 +52,7 @@ def _grasp(one: Any, folder: Path, how: GraspReading) -> GivenGrasp:
     if not isinstance(one, Mapping) or not all(isinstance(one.get(key), str) for key in ("name", "object", "skin")):
         raise InputError("want name, object and skin of every grasp")
     more: dict[str, Any] = {"hand": str(one.get("hand", ""))}
-    more |= {key: number(one[key], key, above=0.0) for key in ("scale", "friction", "mass") if key in one}
+    more |= {key: number_in(one[key], key, above=0.0) for key in ("scale", "friction", "mass") if key in one}
     file = folder / one["skin"]
     if not file.resolve().is_relative_to(folder.resolve()):
         raise InputError(f"{one['name']}: '{one['skin']}' lies outside of the folder")

@@ -15,7 +15,7 @@ from warpjld.files.reading import reading
 from warpjld.files.text_file import read_text
 from warpjld.motion.array_file import read_arrays
 from warpjld.study.scoring.given import GivenGrasp
-from warpjld.study.scoring.reading_grasps import GraspReading, number
+from warpjld.study.scoring.reading_grasps import GraspReading, number_in
 from warpjld.tables.files import read_table
 
 __all__ = ["read_own_study", "study_tables"]
@@ -68,7 +68,7 @@ def _grasp(
     rotation: NDArray[np.float64],
 ) -> GivenGrasp:
     given = [key for key in ("scale", "friction", "mass") if row.get(key)]
-    more: dict[str, Any] = {key: number(row[key], key, above=0.0) for key in given}
+    more: dict[str, Any] = {key: number_in(row[key], key, above=0.0) for key in given}
     return GivenGrasp(f"trial {trial}", str(row["object"]), position, rotation, angles=angles, hand=hand, **more)
 
 

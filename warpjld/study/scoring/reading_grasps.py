@@ -15,7 +15,7 @@ from warpjld.study.named_angles import angles_by_name, beyond_limits
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.study.scoring.joint_names import JointNames
 
-__all__ = ["GraspReading", "number"]
+__all__ = ["GraspReading", "number_in"]
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class GraspReading:
         return GivenGrasp(name, thing, at - skeleton.rest[0], turn, angles=angles, message=said, **more)
 
 
-def number(value: Any, what: str, *, above: float | None = None) -> float:
+def number_in(value: Any, what: str, *, above: float | None = None) -> float:
     """A finite number of a file, which may write it as text as YAML does with 1e-5.
 
     Raises:

@@ -171,7 +171,7 @@ class Mortar:
     def _within(self, x: Array, reach: float) -> Ints32:
         """Slave and master facets whose boxes are within ``reach``, shape (P, 2), by slave and by master."""
         import warp as wp
-        from warpjld_kernels import contact_mortar
+        from warpjld_kernels import contact_facets
 
         origin = x[self.slave.nodes].mean(axis=0)
         boxes = [_boxes(x - origin, surface) for surface in (self.slave, self.master)]
@@ -188,7 +188,7 @@ class Mortar:
                 np.cumsum(counts, out=starts[1:])
                 out = np.empty(max(int(starts[-1]), 1), np.int32)
             arguments = [*inputs, shared(starts), fill, shared(counts), shared(out)]
-            wp.launch(contact_mortar.facet_pairs, dim=count, inputs=arguments, device="cpu")
+            wp.launch(contact_facets.facet_pairs, dim=count, inputs=arguments, device="cpu")
         facet = np.repeat(np.arange(count, dtype=np.int32), counts)
         pairs = np.stack([facet, out[: len(facet)]], axis=1)
         return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]

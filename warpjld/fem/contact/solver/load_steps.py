@@ -21,7 +21,7 @@ from warpjld.fem.contact.solver.contact_system import LoadStep
 from warpjld.fem.contact.solver.course import Course
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.newton_state import Equilibrium
-from warpjld.fem.contact.solver.passing import LEAST_SHARE, Passing
+from warpjld.fem.contact.solver.passing import Passing, jumps
 from warpjld.fem.contact.solver.rougher import from_rougher
 from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
@@ -54,12 +54,6 @@ _PART = 0.85
 
 Guess = Callable[[float, float, Array], Array]
 """Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
-
-
-def _jumps(share: float, cut: float) -> bool:
-    """Whether a guess jumps however short the step is: the share that contact could follow hardly grew when the step
-    was cut to another share, which was 1 if it was not cut."""
-    return LEAST_SHARE < cut < 1.0 and share < 1.5 * cut
 
 
 class LoadSteps:
@@ -160,22 +154,11 @@ class LoadSteps:
         unheld: tuple[float, Array, LoadStep, Equilibrium] | None = None
         while todo:
             target = todo[0]
-            newton.solves = newton.iterations = 0
-            newton.failure = ""
+            newton.solves, newton.iterations, newton.failure = 0, 0, ""
             step = self._step(now, target)
             carried = self._carried(step)
-            ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
-            share = self.passing.share(self.u, ahead, step.before, step.time)
-            if _jumps(share, cut):
-                share = 1.0
-            if share < _WHOLE and cuts < _CUTS:
-                cuts, cut = cuts + 1, share
-                todo.insert(0, now + share * (target - now))
-                continue
-            way = (self.body.mesh.nodes, self.u, ahead)
-            self.states = touched_at(self.interfaces, self.states, *way, step)
-            share = first_touch(self.interfaces, self.states, *way, step)
-            if _TOUCHING < share < _WHOLE and cuts < _CUTS:
+            share, cut = self._share(step, carried, cut, may_cut=cuts < _CUTS)
+            if share < _WHOLE:
                 cuts += 1
                 todo.insert(0, now + share * (target - now))
                 continue
@@ -195,9 +178,8 @@ class LoadSteps:
                 status, found = SolveStatus.PASSED, None
             solves += newton.solves
             iterations += newton.iterations
-            if found is None and status is SolveStatus.SLIDING and self._could_hold(step):
-                status = SolveStatus.MAX_ITERATIONS
-                newton.failure = "friction could hold it, but how was not found"
+            if found is None and status is SolveStatus.SLIDING:
+                status = self._sliding(step)
             if overlap := self._blocked(step, found):
                 message = f"no equilibrium at time {target:.4g}: {overlap}; no force can part them"
                 return self._end(SolveStatus.BLOCKED, reached, message, step)
@@ -205,31 +187,59 @@ class LoadSteps:
                 halvings += 1
                 unstable = unstable or status is SolveStatus.INDEFINITE
                 if halvings > self._most_halvings(status):
-                    if unstable and status is SolveStatus.MAX_ITERATIONS:  # the longer steps say why
-                        status, newton.failure = SolveStatus.INDEFINITE, ""
-                    reason = through or newton.failure or status.value
+                    status, reason = self._reason(status, through, unstable)
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
                 tell(f"time {target:.3g}: {status.value}; halving the step")
                 todo.insert(0, 0.5 * (now + target))
                 continue
-            self.steps.append(newton.solves)
-            self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
-            self.last_step = self._last_step(now, found)
-            self.u, self.states, now, cut, unstable = found.displacement, found.states, target, 1.0, False
+            self._take(found, carried, now, target)
+            now, cut, unstable = target, 1.0, False
             todo.pop(0)
             halvings = max(0, halvings - 1)
             if target not in self.times:
                 continue
-            for interface, reach in zip(self.interfaces, self._reaches, strict=True):
-                interface.reach = reach  # what overlapped at the start is parted
             reached.append(self._instant(target, found, solves, iterations))
             tell(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
             solves = iterations = touches = 0
-            wish = watch(reached[-1]) if watch else None
-            if wish:
+            if watch and (wish := watch(reached[-1])):
                 return self._end(SolveStatus.STOPPED, reached, wish, step)
         return self._end(SolveStatus.CONVERGED, reached, SolveStatus.CONVERGED.value, step)
+
+    def _sliding(self, step: LoadStep) -> SolveStatus:
+        """Whether a body that was seen to slide does so by statics, or the solver found no way to hold it."""
+        if not self._could_hold(step):
+            return SolveStatus.SLIDING
+        self.newton.failure = "friction could hold it, but how was not found"
+        return SolveStatus.MAX_ITERATIONS
+
+    def _reason(self, status: SolveStatus, through: str, unstable: bool) -> tuple[SolveStatus, str]:
+        """Why steps are halved no more; where longer steps were ``unstable``, they say why."""
+        if unstable and status is SolveStatus.MAX_ITERATIONS:
+            return SolveStatus.INDEFINITE, through or SolveStatus.INDEFINITE.value
+        return status, through or self.newton.failure or status.value
+
+    def _share(self, step: LoadStep, carried: Array, cut: float, *, may_cut: bool) -> tuple[float, float]:
+        """How much of a step to take so that bodies do not pass one another and friction acts from the first touch on;
+        1 for all of it. And the share that passing bodies leave of it, to tell guesses that jump (``passing.jumps``)."""
+        ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
+        share = self.passing.share(self.u, ahead, step.before, step.time)
+        if share < _WHOLE and may_cut and not jumps(share, cut):
+            return share, share
+        way = (self.body.mesh.nodes, self.u, ahead)
+        self.states = touched_at(self.interfaces, self.states, *way, step)
+        share = first_touch(self.interfaces, self.states, *way, step)
+        return share if _TOUCHING < share < _WHOLE and may_cut else 1.0, cut
+
+    def _take(self, found: Equilibrium, carried: Array, now: float, target: float) -> None:
+        """Go on from an equilibrium."""
+        self.steps.append(self.newton.solves)
+        self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
+        self.last_step = self._last_step(now, found)
+        self.u, self.states = found.displacement, found.states
+        if target in self.times:
+            for interface, reach in zip(self.interfaces, self._reaches, strict=True):
+                interface.reach = reach  # what overlapped at the start is parted
 
     def _through(self, step: LoadStep, found: Equilibrium) -> str:
         """What went through what, or lies in it unseen, in words; nothing where nothing does."""

@@ -22,7 +22,7 @@ from warpjld.fem.contact.obstacles.obstacle import Obstacle
 from warpjld.fem.contact.obstacles.thickness import half_thickness, way_past
 from warpjld.fem.load.prescribed import components
 
-__all__ = ["LEAST_SHARE", "Passing"]
+__all__ = ["LEAST_SHARE", "Passing", "jumps"]
 
 _FOLLOWED = 0.75
 """How far behind a surface a step may aim, over what contact looks ahead: farther off it fades."""
@@ -238,3 +238,9 @@ def _past_obstacle(
     if (way <= gap).all():
         return 1.0
     return _followed(way, gap, min(interface.reach, half_thickness(obstacle, before)))
+
+
+def jumps(share: float, cut: float) -> bool:
+    """Whether a guess jumps however short the step is: the share that contact could follow hardly grew when the step
+    was cut to another share, which was 1 if it was not cut."""
+    return LEAST_SHARE < cut < 1.0 and share < 1.5 * cut

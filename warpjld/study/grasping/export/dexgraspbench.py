@@ -10,7 +10,7 @@ import numpy as np
 
 from warpjld.files.manifest import write_json
 from warpjld.files.whole_file import whole_file
-from warpjld.study.grasping.export.grasps import ClosedTrial, posture
+from warpjld.study.grasping.export.grasps import ClosedTrial, exported_posture
 from warpjld.study.grasping.load import hand_of
 
 __all__ = ["write_dexgraspbench"]
@@ -32,7 +32,7 @@ def write_dexgraspbench(trials: Sequence[ClosedTrial], folder: Path) -> list[Pat
 
 
 def _content(trial: ClosedTrial, trials: Sequence[ClosedTrial]) -> dict[str, Any]:
-    joints = posture(trial, trials)
+    joints = exported_posture(trial, trials)
     qpos = np.array([*trial.position.tolist(), *trial.quaternion, *joints.values()])
     return {
         "grasp_qpos": qpos,
@@ -55,7 +55,10 @@ def _header(trials: Sequence[ClosedTrial]) -> dict[str, Any]:
         "world": "the object's frame: Y up, the middle of its bounding box at 0",
         "joints": "JOINT.CHANNEL, channels flexion, pivot, twisting, abduction; what is not named is as at rest",
         "hands": {
-            name: {"root": hand_of(trial.hand).rig.skeleton.names[0], "joint_names": list(posture(trial, trials))}
+            name: {
+                "root": hand_of(trial.hand).rig.skeleton.names[0],
+                "joint_names": list(exported_posture(trial, trials)),
+            }
             for name, trial in hands.items()
         },
     }

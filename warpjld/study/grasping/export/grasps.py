@@ -18,7 +18,7 @@ from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.named_angles import channel_names, free_channels
 from warpjld.study.shards import Shards
 
-__all__ = ["ClosedTrial", "closed_trials", "posture", "write_obj", "write_objects"]
+__all__ = ["ClosedTrial", "closed_trials", "exported_posture", "write_obj", "write_objects"]
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def closed_trials(plan: GraspPlan, shards: Shards, wanted: Sequence[int] | None 
     return found
 
 
-def posture(trial: ClosedTrial, among: Sequence[ClosedTrial]) -> dict[str, float]:
+def exported_posture(trial: ClosedTrial, among: Sequence[ClosedTrial]) -> dict[str, float]:
     """Angles by name [rad]: of joints with room to move, and those that are not as at rest in some of the trials."""
     skeleton = hand_of(trial.hand).rig.skeleton
     chosen = free_channels(skeleton, np.stack([one.angles for one in among if one.hand == trial.hand]))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from warpjld.files.whole_file import whole_file
 from warpjld.skeleton import Skeleton
-from warpjld.study.grasping.export.grasps import ClosedTrial, posture
+from warpjld.study.grasping.export.grasps import ClosedTrial, exported_posture
 from warpjld.study.grasping.load import hand_of
 
 __all__ = ["write_isaac"]
@@ -52,7 +52,7 @@ def _head(group: Sequence[ClosedTrial]) -> list[str]:
         f"  object: {_text(first.thing.name)}",
         f"  scale: {_number(first.scale)}",
         f"  mass: {_number(first.row['mass'])}",
-        f"  joints: [{', '.join(_text(name) for name in posture(first, group))}]",
+        f"  joints: [{', '.join(_text(name) for name in exported_posture(first, group))}]",
         "  friction:",
         *(f"    {trial.name}: {_number(trial.row['friction'])}" for trial in group),
         "",
@@ -69,7 +69,7 @@ def _grasp(trial: ClosedTrial, group: Sequence[ClosedTrial]) -> list[str]:
         f"    position: [{', '.join(map(_number, trial.position.tolist()))}]",
         f"    orientation: {{w: {w}, xyz: [{x}, {y}, {z}]}}",
         "    cspace_position:",
-        *(f"      {_text(name)}: {_number(value)}" for name, value in posture(trial, group).items()),
+        *(f"      {_text(name)}: {_number(value)}" for name, value in exported_posture(trial, group).items()),
     ]
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from warpjld.kernel_cache import remove_damaged_kernels
 from warpjld.runtime import quiet
+from warpjld.runtime.kernel_cache import remove_damaged_kernels
 
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what objects look like is known on Linux only")
 
