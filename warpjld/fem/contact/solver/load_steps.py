@@ -21,7 +21,7 @@ from warpjld.fem.contact.solver.contact_system import LoadStep
 from warpjld.fem.contact.solver.course import Course
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.newton_state import Equilibrium
-from warpjld.fem.contact.solver.passing import Passing, jumps
+from warpjld.fem.contact.solver.passing import Passing, guess_jumps
 from warpjld.fem.contact.solver.rougher import from_rougher
 from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
@@ -221,10 +221,10 @@ class LoadSteps:
 
     def _share(self, step: LoadStep, carried: Array, cut: float, *, may_cut: bool) -> tuple[float, float]:
         """How much of a step to take so that bodies do not pass one another and friction acts from the first touch on;
-        1 for all of it. And the share that passing bodies leave of it, to tell guesses that jump (``passing.jumps``)."""
+        1 for all of it. And the share that passing bodies leave of it, to tell guesses that jump (``guess_jumps``)."""
         ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
         share = self.passing.share(self.u, ahead, step.before, step.time)
-        if share < _WHOLE and may_cut and not jumps(share, cut):
+        if share < _WHOLE and may_cut and not guess_jumps(share, cut):
             return share, share
         way = (self.body.mesh.nodes, self.u, ahead)
         self.states = touched_at(self.interfaces, self.states, *way, step)

@@ -22,7 +22,7 @@ from warpjld.fem.contact.obstacles.obstacle import Obstacle
 from warpjld.fem.contact.obstacles.thickness import half_thickness, way_past
 from warpjld.fem.load.prescribed import components
 
-__all__ = ["LEAST_SHARE", "Passing", "jumps"]
+__all__ = ["LEAST_SHARE", "Passing", "guess_jumps"]
 
 _FOLLOWED = 0.75
 """How far behind a surface a step may aim, over what contact looks ahead: farther off it fades."""
@@ -240,7 +240,7 @@ def _past_obstacle(
     return _followed(way, gap, min(interface.reach, half_thickness(obstacle, before)))
 
 
-def jumps(share: float, cut: float) -> bool:
+def guess_jumps(share: float, cut: float) -> bool:
     """Whether a guess jumps however short the step is: the share that contact could follow hardly grew when the step
     was cut to another share, which was 1 if it was not cut."""
     return LEAST_SHARE < cut < 1.0 and share < 1.5 * cut
