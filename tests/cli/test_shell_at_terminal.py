@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from warpjld.errors import InputError
 from warpjld.script.session import Session
 
 pty = pytest.importorskip("pty", reason="terminals of this kind are POSIX's")
+termios = pytest.importorskip("termios")
 
 COMMANDS = """
 import sys
@@ -111,18 +113,28 @@ class Terminal:
         )
         os.close(theirs)
         self.said = ""
+        self._prompts = 0
 
     def wait(self, text: str, count: int = 1) -> None:
         """Until it has said something so many times."""
         until = time.monotonic() + 60.0
         while self.said.count(text) < count:
             assert time.monotonic() < until, f"no {text!r} in {self.said!r}"
+            if not select.select([self._ours], [], [], 1.0)[0]:
+                continue
             try:
                 self.said += os.read(self._ours, 4096).decode(errors="replace")
             except OSError:  # the terminal's other end is closed
                 assert self.said.count(text) >= count, f"no {text!r} in {self.said!r}"
 
     def type(self, text: str) -> None:
+        """At the next prompt, when keys go to the program: before, the terminal itself would take Ctrl-D."""
+        self._prompts += 1
+        self.wait("jld> ", self._prompts)
+        until = time.monotonic() + 60.0
+        while termios.tcgetattr(self._ours)[3] & termios.ICANON:
+            assert time.monotonic() < until, "the terminal still edits lines itself"
+            time.sleep(0.01)
         os.write(self._ours, text.encode())
 
 
@@ -146,7 +158,8 @@ def test_a_session_at_a_terminal(tmp_path: Path) -> None:
 def test_a_session_that_is_told_to_end_keeps_its_lines(tmp_path: Path) -> None:
     shell = Terminal(tmp_path)
     shell.wait("QUIT leaves.")
-    shell.type("RATE 25\rPRINT 'here'\r")
+    shell.type("RATE 25\r")
+    shell.type("PRINT 'here'\r")
     shell.wait("here", 2)
     shell.process.send_signal(signal.SIGHUP)
     assert shell.process.wait(30) == 130
