@@ -112,7 +112,7 @@ def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_p
 
 def test_what_is_no_state_is_refused(tmp_path: Path) -> None:
     (tmp_path / "state.npz").write_text("nonsense")
-    with pytest.raises(InputError, match="no state of a contact solve"):
+    with pytest.raises(InputError, match="cannot be read as a state of a contact solve"):
         load_checkpoint(tmp_path / "state.npz")
 
 
