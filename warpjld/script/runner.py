@@ -79,7 +79,8 @@ def run_scene(
     with contact_kept(scene, folder) as keeping:
         made = Making(scene, folder, frames, outputs, summary, device, threads, progress, script, keeping)
         content = made.all()
-        if made.failures.found:
+        unsolved = made.contact is not None and made.contact.verdict.failed
+        if made.failures.found and not unsolved:  # else contact is why, and the summary names what could not be made
             raise WarpjldError(
                 f"not made: {'; '.join(made.failures.lines())}; all else that was asked for is in {folder}"
             )
