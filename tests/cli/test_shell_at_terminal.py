@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -138,8 +139,15 @@ class Terminal:
         os.write(self._ours, text.encode())
 
 
-def test_a_session_at_a_terminal(tmp_path: Path) -> None:
-    shell = Terminal(tmp_path)
+@pytest.fixture
+def shell(tmp_path: Path) -> Iterator[Terminal]:
+    made = Terminal(tmp_path)
+    yield made
+    made.process.kill()  # nothing else ends it where a test failed
+    made.process.wait()
+
+
+def test_a_session_at_a_terminal(tmp_path: Path, shell: Terminal) -> None:
     shell.wait("QUIT leaves.")
     shell.type("RATE 25\r")
     for number, line in enumerate(("BREAK", "LEAVE", "NONSENSE"), 1):
@@ -155,8 +163,7 @@ def test_a_session_at_a_terminal(tmp_path: Path) -> None:
     assert "Traceback" not in shell.said
 
 
-def test_a_session_that_is_told_to_end_keeps_its_lines(tmp_path: Path) -> None:
-    shell = Terminal(tmp_path)
+def test_a_session_that_is_told_to_end_keeps_its_lines(tmp_path: Path, shell: Terminal) -> None:
     shell.wait("QUIT leaves.")
     shell.type("RATE 25\r")
     shell.type("PRINT 'here'\r")

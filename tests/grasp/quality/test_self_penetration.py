@@ -10,7 +10,7 @@ from tests.grasp.quality.winding import closed, distance, winding
 from warpjld.covering import Covering
 from warpjld.covering.intersections import surface_parts
 from warpjld.geometry.normals import vertex_normals
-from warpjld.grasp.both_ways import BothWays
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.quality import penetration, self_penetration
 from warpjld.grasp.shapes import ball
 from warpjld.rig import Rig
@@ -56,5 +56,5 @@ def test_the_volume_is_that_of_a_fine_sampling(rig: Rig, covering: Covering) -> 
     inside = winding(sample, closed(skin.astype(np.float64), covering.surface.faces)) > 0.5
     exact = inside.mean() * 4.0 / 3.0 * np.pi * radius**3
     assert 0.2 < inside.mean() < 0.8
-    found = penetration(BothWays(covering, ball(2.0 * radius, subdivisions=4).placed(centre)), skin)
+    found = penetration(HandObjectGaps(covering, ball(2.0 * radius, subdivisions=4).placed(centre)), skin)
     assert found.volume == pytest.approx(exact, rel=0.015)
