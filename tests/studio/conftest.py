@@ -132,7 +132,15 @@ class Window:
         mouse.down()
         mouse.move(way["x"] + share * way["width"], way["y"] + way["height"] / 2, steps=8)
         mouse.up()
-        return float(thumb.get_attribute("aria-valuenow"))
+        seen = [""]
+
+        def stays() -> bool:
+            assert self.room.worker.settle()
+            seen.append(thumb.get_attribute("aria-valuenow"))
+            return seen[-1] == seen[-2]
+
+        until(stays, "the slider stays where it was let go")
+        return float(seen[-1])
 
     def press(self, name: str) -> None:
         """Press a button."""
