@@ -14,13 +14,16 @@ __all__ = [
     "commands",
     "device",
     "domains",
+    "fresh_start",
     "json",
     "out_folder",
     "parameters",
     "quiet",
     "ray",
     "rig",
+    "table_format",
     "threads",
+    "trial_processes",
 ]
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
@@ -52,6 +55,19 @@ ray: Decorator = click.option(
 )
 allow_mixed: Decorator = click.option(
     "--allow-mixed", is_flag=True, help="With --ray: take machines too that give other last bits."
+)
+trial_processes: Decorator = click.option(
+    "--processes", type=click.IntRange(min=1), help="Worker processes; one a core by default."
+)
+table_format: Decorator = click.option(
+    "--table",
+    type=click.Choice(["parquet", "csv", "both"]),
+    default="parquet",
+    show_default=True,
+    help="Format of the results table.",
+)
+fresh_start: Decorator = click.option(
+    "--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder."
 )
 json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write the result to stdout as JSON.")
 quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")

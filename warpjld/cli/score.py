@@ -41,15 +41,9 @@ __all__ = ["score_command"]
     show_default=True,
     help="Of a recording, its last frame is the grasp, or each.",
 )
-@click.option("--processes", type=click.IntRange(min=1), help="Worker processes; one a core by default.")
-@click.option(
-    "--table",
-    type=click.Choice(["parquet", "csv", "both"]),
-    default="parquet",
-    show_default=True,
-    help="Format of the results table.",
-)
-@click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
+@options.trial_processes
+@options.table_format
+@options.fresh_start
 @options.device
 @options.ray
 @options.allow_mixed

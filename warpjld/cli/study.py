@@ -17,15 +17,9 @@ __all__ = ["study_command"]
 @click.command("study")
 @click.argument("plan", type=click.Path(path_type=Path))
 @options.out_folder
-@click.option("--processes", type=click.IntRange(min=1), help="Worker processes; one a core by default.")
-@click.option(
-    "--table",
-    type=click.Choice(["parquet", "csv", "both"]),
-    default="parquet",
-    show_default=True,
-    help="Format of the results table.",
-)
-@click.option("--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder.")
+@options.trial_processes
+@options.table_format
+@options.fresh_start
 @click.option("--rerun", "row", type=click.IntRange(min=0), metavar="ROW", help="Repeat one trial, with pictures.")
 @click.option(
     "--export",

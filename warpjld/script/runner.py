@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from warpjld import render
 from warpjld.covering.device import checked_device
@@ -24,9 +24,6 @@ from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers, held, notes, stage
 from warpjld.script.summary import Summary
 from warpjld.simulation.specification import located
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["Report", "cast", "run_scene"]
 
@@ -86,7 +83,7 @@ def run_scene(
             )
         if made.contact is not None and made.contact.solved.interrupted:
             raise made.unsolved(made.contact)
-    if made.contact is not None and made.contact.verdict.failed:
+    if made.contact is not None and unsolved:
         raise made.unsolved(made.contact)
     return content
 

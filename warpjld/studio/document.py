@@ -60,11 +60,6 @@ class ScriptDocument:
         return self.text != self.saved
 
     @property
-    def can_undo(self) -> bool:
-        """Whether an edit is left to be undone."""
-        return bool(self._undo)
-
-    @property
     def can_redo(self) -> bool:
         """Whether an edit was undone last."""
         return bool(self._redo)
@@ -94,11 +89,6 @@ class ScriptDocument:
     def redo(self) -> bool:
         """Take the last undone step again; False where there is none."""
         return self._swap(self._redo, self._undo)
-
-    def take_back(self) -> None:
-        """Undo the last step for good: it was refused."""
-        self.undo()
-        self._redo.pop()
 
     def save(self, path: Path | None = None) -> Path:
         """Write the file, whole or not at all; with a path, that file from now on."""
