@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,18 +19,15 @@ if TYPE_CHECKING:
 
 _DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
-# pytest-xdist workers must not compile into one another's kernel cache
-if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    base = os.environ.get("WARP_CACHE_PATH", str(Path.home() / ".cache" / "warpjld-tests"))
-    os.environ["WARP_CACHE_PATH"] = str(Path(base) / worker)
-
+# bindings, hands and meshes of flesh are kept for this run of the tests and shared by its workers: each is made once by
+# the code under test, and nothing that was made before counts
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    _KEPT = tempfile.TemporaryDirectory(prefix="warpjld-tests-")
+    os.environ["WARPJLD_CACHE"] = _KEPT.name
 
 # how long an example takes is the machine's and its other users' affair
 settings.register_profile("warpjld", deadline=None)
 settings.load_profile("warpjld")
-
-# what was bound by other tests, or by other programs, is bound again
-os.environ["WARPJLD_CACHE"] = "off"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
