@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 
 from tests.benchmarks.gpu import main
 
 
+@pytest.mark.slow
 def test_every_row_is_measured(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["--device", "cpu", "--small", "--json", str(tmp_path / "gpu.json")])
     assert done.exit_code == 0, done.output

@@ -106,6 +106,7 @@ def test_a_thigh_behind_the_palm_is_no_palm(figure: Rig) -> None:
     assert np.linalg.norm(middle - palm.middle) < 0.03
 
 
+@pytest.mark.slow
 def test_a_body_takes_an_object_with_its_arm(anny: Scene) -> None:
     scene = _fresh(anny)
     Interpreter(scene).run_text("OBJECT APPLE BALL 0.07 AT 0.25 0.3 0.4\nGRASP 0 40 LEFT APPLE AUTO")

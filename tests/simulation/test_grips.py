@@ -107,6 +107,7 @@ def test_a_force_beyond_the_muscles_is_unreachable(run: Callable[[str], Scene], 
     assert max(row.share for row in report.rows if row.digit == "index") <= 1.05
 
 
+@pytest.mark.slow
 def test_a_force_beyond_the_range_of_motion_is_unreachable(run: Callable[[str], Scene], tmp_path: Path) -> None:
     scene = run(PLATE + "SQUEEZE 5 8 LEFT FORCE 40 MOST 0.5\nPRESS 2 8 EVERY 3")
     (found,) = solved(scene, tmp_path).grips

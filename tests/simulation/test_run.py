@@ -139,7 +139,7 @@ def test_bones_in_a_rigid_object_are_named(run: Callable[[str], Scene], tmp_path
     ("lines", "message"),
     [
         (
-            "OBJECT pea BALL 0.006 AT 0 0 -0.06\nPHYSICAL pea\nFLESH LEFT",
+            "OBJECT pea BALL 0.006 AT 0 0 -0.06\nPHYSICAL pea\nFLESH LEFT ELEMENT 0.004",
             r"PEA lies inside LEFT: nothing can press it out",
         ),
         (
