@@ -1,4 +1,4 @@
-"""Rigid objects as obstacles: built-in shapes are exact, with edges rounded."""
+"""Rigid objects as contact obstacles: exact for built-in shapes, with rounded edges."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from warpjld.grasp import GraspObject
 __all__ = ["rigid_obstacle"]
 
 _ROUNDED = 1e-3
-"""Radius of the edges of boxes and cylinders as contact feels them [m]: skin has no corner to lie around."""
+"""Radius to which contact rounds the edges of boxes and cylinders [m], chosen because skin cannot bend around a sharp
+edge."""
 
 
 def rigid_obstacle(thing: GraspObject, motion: RigidMotion) -> Obstacle:
-    """An object that does not give way and moves as a whole."""
+    """Obstacle for a rigid object with a motion: analytic for balls, boxes and cylinders, a mesh otherwise."""
     middle = 0.5 * (thing.vertices.min(axis=0) + thing.vertices.max(axis=0))
     edge = min(_ROUNDED, 0.2 * float(thing.size.min()))
     if thing.origin == "ball":
