@@ -73,14 +73,14 @@ def after_contact(
     first = solved.frames[-1].frame if solved.frames else solved.start
     known = (solved.model.animation, specification, request, list(bodies))
     paths = follow_falls(*known, released=bodies, first=first)
-    if not any(path.told() for path in paths.values()):
+    if not any(path.summary() for path in paths.values()):
         return before, solved
     moved = dict(before.moved)
     for name, path in paths.items():
         frames, places = moved.get(name, ([], []))
         moved[name] = ([*frames, *path.frames], [*places, *path.places])
-    told = tuple(text for path in paths.values() if (text := path.told()))
-    return replace(before, moved=moved, falls=(*before.falls, *told)), replace(solved, released=first)
+    falls = tuple(text for path in paths.values() if (text := path.summary()))
+    return replace(before, moved=moved, falls=(*before.falls, *falls)), replace(solved, released=first)
 
 
 def rests_rigidly(model: ContactModel, before: StartFrame, frames: Sequence[float]) -> str:

@@ -242,7 +242,7 @@ class _Run:
         self.settled = self.model, known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
-        """Message about a bone inside an object at one of the times, which no force can separate; None if there is none."""
+        """Message about a bone inside an object at one of the times; None if there is none."""
         found = (self.clearance.inside(model, time) for time in times)
         return next(filter(None, found), None)
 

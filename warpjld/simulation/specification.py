@@ -147,9 +147,9 @@ class SolveSpecification:
         rigid: Whether digits follow the animation whatever force results. Otherwise, and unless ``stop`` or
             ``correct`` is set, a digit stops closing at the force limit of its muscles or the pressure limit of its
             skin.
-        pressure: Largest mean contact pressure that skin bears [Pa]. The default leaves half of a fingertip's flesh
-            between bone and wall: beyond it forces double every tenth of a millimetre, outside the range in which laws
-            of flesh were measured.
+        pressure: Largest contact pressure that skin bears [Pa]. The default leaves half of a fingertip's flesh between
+            bone and wall: beyond it forces double every tenth of a millimetre, outside the range in which laws of flesh
+            were measured.
         state: File of the state from which a stopped run resumes; None: no file.
         rate: Frames per second, for the duration of falls.
         where: Script location, for messages.

@@ -114,7 +114,7 @@ class DeformableBody(ABC):
         """Predictor: displacement at ``time`` estimated from that at ``before`` [m], shape (N, 3)."""
 
     @abstractmethod
-    def way(
+    def path(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
         """Positions of nodes (n,) at the first time and predicted ones at the others [m], each of shape (n, 3)."""

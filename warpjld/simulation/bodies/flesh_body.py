@@ -139,10 +139,10 @@ class FleshBody(DeformableBody):
         return self.hand.guess(start.to(self.moves(before)), start.to(self.moves(time)), displacement)
 
     def carry(self, before: float, time: float, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 3) [m] moved rigidly with the root of the hand from one time to another."""
+        """Points (n, 3) [m] moved rigidly with the hand's first bone from one time to another."""
         return self.moves(before).to(self.moves(time)).of(np.zeros(len(points), np.int64), points)
 
-    def way(
+    def path(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
         """Current and predicted positions of nodes [m]."""

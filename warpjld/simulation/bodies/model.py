@@ -1,4 +1,4 @@
-"""Contact model: all bodies merged into one mesh, with contact pairs, loads and Dirichlet conditions (R103, R109, R110)."""
+"""Contact model: all bodies merged into one mesh, with pairs, loads and Dirichlet conditions (R103, R109, R110)."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class ContactModel:
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], history: History
     ) -> NDArray[np.float64]:
-        """Predictor: displacement (N, 3) [m] at ``time`` from that at ``before``, with the Dirichlet values inserted."""
+        """Predictor: displacement (N, 3) [m] at ``time`` from that at ``before``, with Dirichlet values inserted."""
         out = displacement.copy()
         for body in self.bodies:
             span = self.spans[body.name]

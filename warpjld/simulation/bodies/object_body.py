@@ -119,7 +119,7 @@ class ObjectBody(DeformableBody):
             return displacement
         return displacement if around.carry is None else displacement + (around.carry(at) - at)
 
-    def way(
+    def path(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
         """Current and predicted positions of nodes [m]."""

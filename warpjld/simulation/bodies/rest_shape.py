@@ -258,7 +258,7 @@ def _digits(segment: str) -> set[str]:
 def _harmonic(
     mesh: HexMesh, known: NDArray[np.integer], values: NDArray[np.float64], still: NDArray[np.integer]
 ) -> NDArray[np.float64]:
-    """Discrete harmonic field over the mesh edges with given values at ``known`` and zero at ``still``, shape (N, 3)."""
+    """Discrete harmonic field over the mesh edges, given at ``known`` and zero at ``still``, shape (N, 3)."""
     from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import splu
 
