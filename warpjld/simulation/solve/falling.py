@@ -77,7 +77,7 @@ class FallPath:
         return max(float(np.linalg.norm(place.position - first)) for place in self.places)
 
     def summary(self) -> str:
-        """``BALL … falls from frame 0 on, and comes to rest on BOWL at frame 61``, as a message; empty without a fall."""
+        """``BALL … falls from frame 0 on, and comes to rest on BOWL at frame 61``; empty if it did not fall."""
         if self.distance < _MOVED and self.rests is not None:
             return ""
         begun = f"{self.name} is held by nothing: it falls from frame {self.frames[0]:g} on"
