@@ -20,7 +20,8 @@ _HELD = (3e-2, 0.4, 1e-4)
 """Artificial stiffness of bodies held by contact alone, relative to their own; it limits steps and causes no force.
 First value (large enough to find contact), factor per iteration, and smallest value."""
 _GRASPED = 1e-4
-"""Smallest over largest eigenvalue of the contact stiffness on rigid motions above which contact resists all motions."""
+"""Smallest over largest eigenvalue of the contact stiffness on rigid motions above which contact resists all
+motions."""
 
 
 class UnconstrainedBodies:
