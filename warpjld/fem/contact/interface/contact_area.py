@@ -10,7 +10,8 @@ nodes, and linear between them.
 
 The border of the stick area is found alike: the reserve of friction, μ p − |q|, vanishes as √s there (Cattaneo,
 Mindlin; Johnson 1985, §7.2). As slip depends on the load history, the scale is taken from the next node inwards: the
-ratio of the two reserves is φ(f) / φ(f + 1). """
+ratio of the two reserves is φ(f) / φ(f + 1).
+"""
 
 from __future__ import annotations
 

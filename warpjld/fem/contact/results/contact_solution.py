@@ -104,7 +104,8 @@ class PairContact:
         """Deepest penetration [m], ≥ 0.
 
         Between two meshes that of weighted (mortar) gaps, which are constrained; single nodes of balls with
-        non-matching faces penetrate the other side by up to a tenth of an edge, most at the border of contact. """
+        non-matching faces penetrate the other side by up to a tenth of an edge, most at the border of contact.
+        """
         return float(np.maximum(-self.gap, 0.0).max(initial=0.0))
 
 

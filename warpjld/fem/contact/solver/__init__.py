@@ -38,11 +38,11 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
    set strategy: Hüeber & Wohlmuth 2005). λ_n of the previous solve bounds friction in (3), so that each solve is a
    convex problem (Tresca friction).
 5. *Alternating phase*, afterwards: λ is updated only if the active set did not change; otherwise a line search along Δu
-   (by work, or by the residual if E is present) settles the active set. In either phase friction is bounded by the
-   current pressure (``coupled``: full Coulomb friction) once the same points touch, slide and stick in successive
-   iterations, as an iteration over Tresca bounds leaves up to 0.7 of the error each time. If sticking points change
-   because of that, the bound is taken from the previous solve again. A search whose contact points, searched again, do
-   not agree continues in this phase, at most twice.
+   (by work, or by the residual if E is present) settles the active set.
+   In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points
+   touch, slide and stick in successive iterations, as iterating over Tresca bounds leaves up to 0.7 of the error each
+   time. If sticking points change because of that, the bound is taken from the previous solve again.
+   A search whose contact points, searched again, do not agree continues in this phase, at most twice.
 6. Bonds whose traction exceeds their strength are broken and the step is solved again; a step that fails is halved.
 
 ``contact_system`` evaluates (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` f_int, f_ext and K.
