@@ -19,6 +19,7 @@ SourceLocation = tuple[str, int, int]
 
 Law = Literal["linear", "neo-hooke", "mooney-rivlin"]
 LAWS: tuple[Law, ...] = ("linear", "neo-hooke", "mooney-rivlin")
+"""Names of the constitutive laws."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from warpjld.fem.contact import Obstacle
 from warpjld.grasp import GraspObject, Places, make_object
 from warpjld.rig import Rig
 from warpjld.simulation.animation import AngleEdit
-from warpjld.simulation.bodies.obstacle import rigid_obstacle
+from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 from warpjld.skeleton.between import poses_between
 from warpjld.skeleton.channels import FLEXION
@@ -72,7 +72,7 @@ class RecordedActor:
     ) -> None:
         self.name, self.rig, self._first = name, rig, first
         if (poses is None) == (angles is None):
-            raise InputError("poses, angles: want one of them")
+            raise InputError("poses, angles: want exactly one of the two")
         if poses is not None and (len(poses) < 1 or poses.positions.shape[1:] != (len(rig.skeleton), 3)):
             raise InputError(f"poses: want shape (F, {len(rig.skeleton)}, 3), got {poses.positions.shape}")
         self._poses = poses
@@ -201,12 +201,7 @@ class RecordedObject:
 
     def obstacle(self, start: float) -> Obstacle:
         """The object as a rigid obstacle; times of the obstacle are in frames from ``start``."""
-
-        def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            here = self.place(start + time)
-            return here.position[0], here.rotation[0]
-
-        return rigid_obstacle(self.thing, motion)
+        return rigid_obstacle(self.thing, placed_motion(self.place, start))
 
 
 class RecordedAnimation:

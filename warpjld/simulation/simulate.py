@@ -190,9 +190,9 @@ class Simulation:
         """
         hands = [hand for hand in self.model.hands if hand.name == actor]
         if not hands:
-            raise InputError(f"{actor} has no flesh that feels: FLESH {actor} makes it so")
+            raise InputError(f"{actor} has no simulated flesh to read: FLESH {actor} adds it")
         if not self.solved.frames:
-            raise InputError(f"{actor} feels nothing: {self.solved.message}")
+            raise InputError(f"no tactile readings of {actor}, as no frame was solved: {self.solved.message}")
         return tactile_readings(self.model, hands[0], self.solved.frames)
 
     def _span(self, name: str) -> slice:

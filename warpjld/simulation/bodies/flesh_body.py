@@ -21,7 +21,7 @@ from warpjld.simulation.animation import ActorAnimation
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.kept_flesh import RestingFlesh, resting_flesh
 from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits
-from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
+from warpjld.simulation.bodies.skin_parts import SkinParts, digit_of_label, skin_parts
 from warpjld.simulation.specification import FleshMaterial, located
 from warpjld.skeleton import Poses, Skeleton
 
@@ -112,6 +112,12 @@ class FleshBody(DeformableBody):
     def touches_itself(self) -> bool:
         """Whether self-contact of its skin is considered."""
         return self.self_contact is not None
+
+    @property
+    def node_digits(self) -> NDArray[np.str_]:
+        """Digit of every node, or ``palm``; empty for inner nodes, shape (N,)."""
+        labels = [digit_of_label(name) for name in self.hand.label_names]
+        return np.array([*labels, ""])[self.hand.node_labels]
 
     @property
     def fleshed(self) -> NDArray[np.bool_]:

@@ -68,7 +68,9 @@ class _Posed:
 
 
 _CLASSES = (_Meshed, Flesh, HexMesh, Bone, Embedding, Fit, Moves, Cushion)
+"""Record types that the cache file of a mesh may contain."""
 _SHARED = ("place", "weights", "skin_faces", "skin_labels", "label_names", "excluded", "skin_fringes")
+"""Fields that ``FleshHand`` and ``_Meshed`` have in common."""
 
 
 def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArray[np.float64]) -> RestingFlesh:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem import Body, Loads, Material, Prescribed, merge
 from warpjld.fem.contact import Bond, Obstacle, Pair
+from warpjld.fem.contact.results.nodal_contact import tributary_areas
 from warpjld.simulation.animation import AngleEdit, Animation
 from warpjld.simulation.bodies.deformable_body import Bearing, DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.flesh_body import FleshBody
@@ -71,6 +72,10 @@ class ContactModel:
     def named(self, name: str) -> DeformableBody:
         """Body by name."""
         return next(body for body in self.bodies if body.name == name)
+
+    def tributary_areas(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Surface area around every node at positions x (N, 3) [m²], 0 for inner nodes, shape (N,)."""
+        return sum((tributary_areas(self.body.mesh, body.faces, x) for body in self.bodies), np.zeros(len(x)))
 
     def prescribed(self, time: float, history: History) -> Prescribed:
         """Dirichlet conditions of all bodies at a time."""

@@ -73,10 +73,7 @@ def rest_in_pose(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tu
 
     surface = Facets(hand.surface.vertices, hand.surface.faces)
     outer = np.setdiff1d(np.unique(mesh.quads(hand.skin_faces)), bone)
-    found, place = surface.locate(mesh.nodes[outer])
-    offset = np.einsum("nij,nj->ni", surface.frames(place, surface.vertices), mesh.nodes[outer] - found.closest)
-    target = surface.at(place, skin) + np.einsum("nij,ni->nj", surface.frames(place, skin), offset)
-    change = _harmonic(mesh, outer, target - nodes[outer], bone)
+    change = _harmonic(mesh, outer, surface.carried(mesh.nodes[outer], skin) - nodes[outer], bone)
     moved = replace(mesh, nodes=nodes + change)
     least = min(_LEAST, 0.5 * float(mesh.scaled_jacobian().min()))
     if moved.scaled_jacobian().min() < least:

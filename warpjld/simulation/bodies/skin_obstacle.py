@@ -28,15 +28,10 @@ class SkinObstacle(Obstacle):
         return self._at(time).project(checked_points(points))
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """See `Obstacle.carried`; the offset from the nearest facet turns with it."""
+        """See `Obstacle.carried`; points move along with their nearest facets."""
         if time_from == time_to or not len(points):
             return checked_points(points)
-        facets = self._at(time_from)
-        found, place = facets.locate(checked_points(points))
-        before, after = facets.vertices, self._shape(time_to)
-        offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
-        turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
-        return np.asarray(facets.at(place, after) + turned)
+        return self._at(time_from).carried(checked_points(points), self._shape(time_to))
 
     def mesh(self, time: float) -> tuple[Points, Ints32]:
         """See `Obstacle.mesh`."""

@@ -19,6 +19,7 @@ from warpjld.simulation.bodies.deformable_body import Bearing
 __all__ = ["ObjectSupport", "handle_of"]
 
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
+"""No Dirichlet conditions."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,6 +49,11 @@ class RigidContact:
     friction: float
     name: str
 
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """Normal and two tangents, orthonormal, shape (3, 3)."""
+        return np.concatenate([self.normal[None], np.linalg.svd(self.normal[None])[2][1:]])
+
 
 @dataclass(frozen=True, eq=False)
 class _Near:

@@ -33,7 +33,7 @@ def jacobian(bodies: Sequence[RigidBody], contacts: Sequence[RigidContact]) -> N
     """Relative contact velocities (normal and two tangents) by velocities and spins of bodies, shape (3C, 6B)."""
     out = np.zeros((3 * len(contacts), 6 * len(bodies)))
     for k, one in enumerate(contacts):
-        axes = np.concatenate([one.normal[None], np.linalg.svd(one.normal[None])[2][1:]])
+        axes = one.axes
         for number, sign in ((one.body, 1.0), (one.other, -1.0)):
             if number >= 0:
                 arm = one.point - bodies[number].centre

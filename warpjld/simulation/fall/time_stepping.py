@@ -121,7 +121,7 @@ def _impelled(
     moves = inverse @ rows.T
     delassus = rows @ moves
     velocity = np.concatenate([np.concatenate([one.velocity, one.spin]) for one in bodies])
-    carried = np.concatenate([_axes(c) @ c.carried for c in contacts])
+    carried = np.concatenate([c.axes @ c.carried for c in contacts])
     gaps = np.array([c.gap - _SLOP for c in contacts])
     friction = np.array([c.friction for c in contacts])
     found = impulses(delassus, rows @ velocity - carried, np.maximum(gaps, 0.0) / length, friction)
@@ -133,8 +133,3 @@ def _impelled(
         parting = (moves @ corrections).reshape(-1, 6)
     pressed = [c for c, p in zip(contacts, found[::3], strict=True) if p > 0.0]
     return pressed, parting
-
-
-def _axes(contact: RigidContact) -> NDArray[np.float64]:
-    """Normal and two tangents as in ``jacobian``, shape (3, 3)."""
-    return np.concatenate([contact.normal[None], np.linalg.svd(contact.normal[None])[2][1:]])

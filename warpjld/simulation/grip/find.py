@@ -22,6 +22,7 @@ from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.hold import HandTrials
 from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
 from warpjld.simulation.grip.squeeze import Squeeze
+from warpjld.simulation.report.table import csv_cell
 from warpjld.simulation.specification import GripSpecification
 from warpjld.skeleton.channels import FLEXION
 
@@ -40,10 +41,12 @@ _PRESSES = 0.01
 transmits a little to both."""
 
 _HELD = (GripStatus.HELD, GripStatus.HELD_AT_ONCE)
+"""Statuses of a successful search."""
 _COLUMNS = (
     *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
     *("chosen", "status"),
 )
+"""Columns of the table of trials."""
 
 
 @dataclass(frozen=True)
@@ -259,10 +262,4 @@ def write_grips(path: Path, found: Sequence[FoundGrip]) -> None:
         writer = csv.DictWriter(file, _COLUMNS, restval="")
         writer.writeheader()
         for one in found:
-            writer.writerows({key: _short(value) for key, value in row.items()} for row in one.rows)
-
-
-def _short(value: object) -> object:
-    if not isinstance(value, float):
-        return value
-    return "" if math.isnan(value) else f"{value:.6g}"
+            writer.writerows({key: csv_cell(value) for key, value in row.items()} for row in one.rows)

@@ -34,6 +34,7 @@ _HOPELESS = 0.6
 """Share of the weight that friction must be able to bear with the pressures before the support is removed. Not 1: under
 the weight an object drags the pads along and presses them harder, by a fifth on fingertips."""
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
+"""No Dirichlet conditions."""
 
 
 class WeightTrials(ABC):

@@ -30,7 +30,7 @@ def restored_grip(content: Mapping[str, Any], contact: ContactSpecification) -> 
     """
     request = next((grip for grip in contact.grips if grip.first == content["first"]), None)
     if request is None:
-        raise InputError(f"it holds a grip at frame {content['first']}, for which nobody asks")
+        raise InputError(f"it holds a grip at frame {content['first']}, which is not in the specification")
     rest = {name: value for name, value in content.items() if name != "first"}
     rest["edits"] = tuple(AngleEdit(**edit) for edit in rest["edits"])
     rest["release"] = None if rest["release"] is None else SupportRelease(**rest["release"])

@@ -14,12 +14,11 @@ from warpjld.fem.hand.suggestions import DigitSlopes, suggestions
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.bodies.skin_parts import digit_of_label
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["ContactRow", "ContactTable", "digit_rows", "write_table"]
+__all__ = ["ContactRow", "ContactTable", "csv_cell", "digit_rows", "write_table"]
 
 
 Slopes = Callable[[str, float, Mapping[str, float]], Mapping[str, DigitSlopes] | None]
@@ -157,8 +156,7 @@ class ContactTable:
 def digit_rows(model: ContactModel, hand: FleshBody, solved: SolvedFrame, effort: Effort) -> list[ContactRow]:
     """Rows of a hand at a frame: its digits and its palm."""
     digits = [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]
-    labels = [digit_of_label(name) for name in hand.hand.label_names]
-    digit_of = np.array([*labels, ""])[hand.hand.node_labels]  # "" for inner nodes
+    digit_of = hand.node_digits
     pressure = solved.pressure(model)[model.spans[hand.name]]
     nodes = {digit: np.flatnonzero(digit_of == digit) for digit in digits}
     return [_row(model, hand, solved, effort, digit, nodes[digit], pressure) for digit in digits if len(nodes[digit])]
@@ -220,10 +218,11 @@ def write_table(path: Path, rows: Sequence[ContactRow]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(columns))
         writer.writeheader()
-        writer.writerows({k: _short(v) for k, v in asdict(row).items()} for row in rows)
+        writer.writerows({k: csv_cell(v) for k, v in asdict(row).items()} for row in rows)
 
 
-def _short(value: object) -> object:
+def csv_cell(value: object) -> object:
+    """A value as written to CSV: floats with six digits, NaN empty."""
     if not isinstance(value, float):
         return value
     return "" if np.isnan(value) else f"{value:.6g}"

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import ContactSolution
-from warpjld.fem.contact.results.nodal_contact import tributary_areas
 from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, Response
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
@@ -137,14 +136,10 @@ def _pressure(
     model: ContactModel, tangent: EquilibriumTangent, solution: ContactSolution, response: Response
 ) -> NDArray[np.float64]:
     """Derivative of the nodal pressure (normal force over tributary area) [Pa], shape (N,)."""
-    mesh, u, du = model.body.mesh, solution.last.displacement, response.displacement
+    x, du = model.body.mesh.nodes + solution.last.displacement, response.displacement
     step = _FAR / max(float(np.abs(du).max(initial=0.0)), _FAR)
-
-    def areas(by: float) -> NDArray[np.float64]:
-        x = mesh.nodes + u + by * du
-        return sum((tributary_areas(mesh, one.faces, x) for one in model.bodies), np.zeros(len(x)))
-
-    area, wider = areas(0.0), (areas(step) - areas(-step)) / (2.0 * step)
+    area = model.tributary_areas(x)
+    wider = (model.tributary_areas(x + step * du) - model.tributary_areas(x - step * du)) / (2.0 * step)
     pushed = tangent.pushed.sum(axis=0)
     pushes = tangent.pushes(response).sum(axis=0)
     rate = pushes * area - pushed * wider

@@ -13,7 +13,6 @@ from warpjld.fem.hand.bone_loads import loads_from_contact
 from warpjld.fem.hand.muscles import effort_of
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.bodies.skin_parts import digit_of_label
 from warpjld.simulation.solve.grasp_balance import allowed_net
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 
@@ -96,7 +95,7 @@ def _pushes(
 ) -> dict[str, tuple[str, float]]:
     """By digit that pushes in the direction of the net force on an object: the object, and that force over the allowed
     one."""
-    digit_of = _digits(hand)
+    digit_of = hand.node_digits
     out: dict[str, tuple[str, float]] = {}
     for name, weight in weights.items():
         force = np.zeros_like(instant.displacement)
@@ -112,14 +111,8 @@ def _pushes(
     return out
 
 
-def _digits(hand: FleshBody) -> NDArray[np.str_]:
-    """Digit of every node, or ``palm``; empty for inner nodes."""
-    labels = [digit_of_label(name) for name in hand.hand.label_names]
-    return np.array([*labels, ""])[hand.hand.node_labels]
-
-
 def peaks_of(model: ContactModel, hand: FleshBody, solved: SolvedFrame) -> dict[str, float]:
     """Highest pressure on the skin of each digit and the palm [Pa]."""
-    digit_of = _digits(hand)
+    digit_of = hand.node_digits
     pressure = solved.pressure(model)[model.spans[hand.name]]
     return {name: float(pressure[digit_of == name].max(initial=0.0)) for name in dict.fromkeys(digit_of)}

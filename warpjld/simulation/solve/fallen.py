@@ -15,7 +15,7 @@ from warpjld.grasp import GraspObject, Places
 from warpjld.simulation.animation import ActorAnimation, AngleEdit, Animation, ObjectAnimation
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.bodies.obstacle import rigid_obstacle
+from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 from warpjld.simulation.fall.rigid_body import RigidBody, rigid_shape
 from warpjld.simulation.solve.falling import FallPath
 from warpjld.simulation.solve.solved_frame import SolvedFrame
@@ -44,12 +44,7 @@ class FallenObject:
 
     def obstacle(self, start: float) -> Obstacle:
         """The object as a rigid obstacle; times of the obstacle are in frames from ``start``."""
-
-        def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            here = self.path.at(start + time)
-            return here.position[0], here.rotation[0]
-
-        return rigid_obstacle(self.thing, motion)
+        return rigid_obstacle(self.thing, placed_motion(self.path.at, start))
 
 
 class FallenAnimation:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.results.nodal_contact import NodalContact, stacked, tributary_areas
+from warpjld.fem.contact.results.nodal_contact import NodalContact, stacked
 from warpjld.simulation.bodies.model import ContactModel
 
 __all__ = ["SolvedFrame", "solved_frame"]
@@ -39,13 +39,9 @@ class SolvedFrame:
 
     def pressure(self, model: ContactModel) -> NDArray[np.float64]:
         """Contact pressure at the nodes: normal force over tributary area [Pa], shape (N,)."""
-        mesh = model.body.mesh
-        x = mesh.nodes + self.displacement
-        area = np.zeros(len(x))
-        for one in model.bodies:
-            area += tributary_areas(mesh, one.faces, x)
+        area = model.tributary_areas(model.body.mesh.nodes + self.displacement)
         force = self.nodal_contact.force.sum(axis=0)
-        return np.divide(force, area, out=np.zeros(len(x)), where=area > 0.0)
+        return np.divide(force, area, out=np.zeros(len(area)), where=area > 0.0)
 
 
 def solved_frame(frame: float, instants: Sequence[ContactInstant]) -> SolvedFrame:

@@ -95,7 +95,7 @@ class Mortar:
         same = slave.quads.shape == master.quads.shape and bool((slave.quads == master.quads).all())
         if same:
             if exclusion is None:
-                raise InputError(f"{pair.title}: a surface against itself wants an exclusion, to know its parts")
+                raise InputError(f"{pair.title}: self-contact needs an exclusion that labels the parts of the surface")
             never |= np.tril(np.ones_like(never))
         self.labels = np.ascontiguousarray(mine), np.ascontiguousarray(other)
         self.joined = joined

@@ -114,6 +114,13 @@ class Facets:
         out: Points = np.einsum("nk,nki->ni", place.weights, vertices[self.faces[place.face]])
         return out
 
+    def carried(self, points: Points, vertices: Array) -> Points:
+        """Points (n, 3) [m] carried along when the surface's vertices move to ``vertices``; the offset of a point from
+        its nearest facet rotates with it."""
+        found, place = self.locate(points)
+        offset = np.einsum("nij,nj->ni", self.frames(place, self.vertices), points - found.closest)
+        return np.asarray(self.at(place, vertices) + np.einsum("nij,ni->nj", self.frames(place, vertices), offset))
+
     def frames(self, place: Place, vertices: Array) -> Array:
         """Orthonormal frames of the triangles of places for given vertices; rows are the first edge, the normal and
         their cross product, shape (n, 3, 3)."""

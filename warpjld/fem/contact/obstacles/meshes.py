@@ -69,13 +69,8 @@ class Keyframed(Moving):
         return self._at(time).project(points)
 
     def _carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """Material points; the offset from the nearest facet rotates with it."""
-        facets = self._at(time_from)
-        found, place = facets.locate(points)
-        before, after = facets.vertices, self._shape(time_to)
-        offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
-        turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
-        return facets.at(place, after) + turned
+        """Material points, carried along with their nearest facets."""
+        return self._at(time_from).carried(points, self._shape(time_to))
 
     def _mesh(self, time: float) -> tuple[Points, Ints32]:
         return self._shape(time), self._facets.faces

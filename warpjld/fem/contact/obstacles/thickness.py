@@ -10,7 +10,7 @@ import numpy as np
 from warpjld.fem.arrays import Array
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
 
-__all__ = ["distance_past", "half_thickness", "way_past"]
+__all__ = ["distance_past", "half_thickness", "relative_paths"]
 
 _POINTS = 200
 """Sample points on an obstacle's surface."""
@@ -42,7 +42,7 @@ def half_thickness(obstacle: Obstacle, time: float = 0.0) -> float:
     return _KNOWN[obstacle]
 
 
-def way_past(obstacle: Obstacle, times: Sequence[float], path: Sequence[Array]) -> Array:
+def relative_paths(obstacle: Obstacle, times: Sequence[float], path: Sequence[Array]) -> Array:
     """Lengths of the paths of points (n, 3) at ascending times relative to an obstacle [m], shape (n,)."""
     out = np.zeros(len(path[0]))
     for before, time, x, there in zip(times[:-1], times[1:], path[:-1], path[1:], strict=True):
@@ -52,6 +52,6 @@ def way_past(obstacle: Obstacle, times: Sequence[float], path: Sequence[Array]) 
 
 def distance_past(obstacle: Obstacle, times: Sequence[float], path: Sequence[Array]) -> float:
     """Longest relative path of points (n, 3) at ascending times [m], among those that may reach the obstacle on it."""
-    lengths = way_past(obstacle, times, path)
+    lengths = relative_paths(obstacle, times, path)
     near = obstacle.project(path[0], times[0]).distance < lengths
     return float(lengths[near].max(initial=0.0))

@@ -54,7 +54,7 @@ _REPEL = 0.25
 _HALVINGS = 5
 """Most successive halvings of a time step."""
 _ADVICE = {
-    False: "it settles where the skin is the stiffer body; else relax it after Aitken, or use the default method",
+    False: "it converges if the skin is the stiffer body; else use Aitken relaxation, or the default method",
     True: "take shorter steps in time, or use the default method",
 }
 
@@ -145,9 +145,9 @@ def _refuse(pairs: Sequence[Pair]) -> None:
         InputError: Self-contact, friction, bonds or offsets.
     """
     for what, asked in (
-        ("does not know a surface that meets itself", any(pair.exclusion is not None for pair in pairs)),
-        ("knows neither friction nor bonds", any(pair.friction > 0.0 or pair.bond is not None for pair in pairs)),
-        ("knows no offsets", any(pair.offset is not None for pair in pairs)),
+        ("supports no self-contact", any(pair.exclusion is not None for pair in pairs)),
+        ("supports neither friction nor bonds", any(pair.friction > 0.0 or pair.bond is not None for pair in pairs)),
+        ("supports no offsets", any(pair.offset is not None for pair in pairs)),
     ):
         if asked:
             raise InputError(f"pairs: the paper's loop {what}; use method='augmented'")

@@ -219,7 +219,7 @@ class EquilibriumTangent:
             other = copy(self._body)
             other.constants = self._body.constants.copy()
             other.constants[:, :3] *= (1.0 + factor * change.stiffness)[:, None]
-            forces.append(_internal(other, self._u.reshape(-1)))
+            forces.append(Elastic(other).forces(self._u.reshape(-1)).forces)
         return forces[0] - forces[1]
 
     def _solved(self, du: Array, pull: Array, fixed: list[Array]) -> list[Array]:
@@ -263,8 +263,3 @@ def _holding(one: InterfaceSlopes, stiffness: Array) -> Array:
     """Penalties E of an interface's constraints, from the nodes' stiffness (N,) [N/m]."""
     stiff = _STIFF * (abs(one.weights) @ stiffness) / one.scale
     return np.concatenate([stiff, np.repeat(stiff[one.sticks], 2)])
-
-
-def _internal(body: Body, u: Array) -> Array:
-    """Internal forces [N], shape (3N,)."""
-    return Elastic(body).forces(u).forces

@@ -19,7 +19,7 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.enclosure import Enclosure
 from warpjld.fem.contact.interface.mortar import Mortar
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
-from warpjld.fem.contact.obstacles.thickness import half_thickness, way_past
+from warpjld.fem.contact.obstacles.thickness import half_thickness, relative_paths
 from warpjld.fem.load.prescribed import components
 
 __all__ = ["LEAST_SHARE", "Passing", "guess_jumps"]
@@ -240,7 +240,7 @@ def _past_obstacle(
     """As ``_past_body``, for a body and an obstacle; limited by the obstacle's half thickness as well."""
     nodes = interface.slave.nodes
     times = [before + (time - before) * k / _LOOKS for k in range(_LOOKS + 1)]
-    motion = way_past(obstacle, times, [x[nodes] + k / _LOOKS * step[nodes] for k in range(_LOOKS + 1)])
+    motion = relative_paths(obstacle, times, [x[nodes] + k / _LOOKS * step[nodes] for k in range(_LOOKS + 1)])
     if motion.max() <= min(interface.reach, _THINNEST):
         return 1.0
     gap = obstacle.project(x[nodes], before).distance
