@@ -87,7 +87,9 @@ class Turns:
             start = fixed if self.omega > 0.5 else self.last
             freed = self._solve(self._known, self._loaded(forces), start)
             if not freed.converged:
-                return self._ended(freed.status, f"released bodies have no equilibrium under the forces found: {freed.message}")
+                return self._ended(
+                    freed.status, f"released bodies have no equilibrium under these forces: {freed.message}"
+                )
             self.last, self.forces = freed, forces
             self.solves += 2
             moved = float(np.abs(freed.displacement - u).max())
