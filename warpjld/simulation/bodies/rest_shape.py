@@ -18,6 +18,7 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
+from warpjld.fem.mesh.harmonic import harmonic_field
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.mesh.untangle import as_far, improve
 from warpjld.skeleton import Poses
@@ -73,7 +74,10 @@ def rest_in_pose(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tu
 
     surface = Facets(hand.surface.vertices, hand.surface.faces)
     outer = np.setdiff1d(np.unique(mesh.quads(hand.skin_faces)), bone)
-    change = _harmonic(mesh, outer, surface.carried(mesh.nodes[outer], skin) - nodes[outer], bone)
+    known, fixed = np.zeros_like(nodes), np.zeros(len(nodes), dtype=bool)
+    known[outer] = surface.carried(mesh.nodes[outer], skin) - nodes[outer]
+    fixed[outer] = fixed[bone] = True
+    change = harmonic_field(mesh, known, fixed)
     moved = replace(mesh, nodes=nodes + change)
     least = min(_LEAST, 0.5 * float(mesh.scaled_jacobian().min()))
     if moved.scaled_jacobian().min() < least:
@@ -250,26 +254,3 @@ def _digits(segment: str) -> set[str]:
     """Digits that a segment's flesh belongs to; the thenar, over the thumb's metacarpal, to both thumb and palm."""
     *before, last = segment.split(".")
     return {*before, *({last} if before[-1:] == ["palm"] and last == "thumb" else ())}
-
-
-def _harmonic(
-    mesh: HexMesh, known: NDArray[np.integer], values: NDArray[np.float64], still: NDArray[np.integer]
-) -> NDArray[np.float64]:
-    """Discrete harmonic field over the mesh edges, given at ``known`` and zero at ``still``, shape (N, 3)."""
-    from scipy.sparse import coo_array, diags_array
-    from scipy.sparse.linalg import splu
-
-    count = len(mesh.nodes)
-    edges = mesh.edges()
-    stiff = 1.0 / np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)
-    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
-    links = coo_array((np.concatenate([stiff, stiff]), (rows, columns)), shape=(count, count)).tocsr()
-    out = np.zeros((count, 3))
-    out[known] = values
-    free = np.ones(count, dtype=bool)
-    free[known] = free[still] = False
-    if free.any():
-        laplacian = (diags_array(links.sum(axis=1)) - links).tocsr()
-        factor = splu(laplacian[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        out[free] = factor.solve(links[free][:, ~free] @ out[~free])
-    return out

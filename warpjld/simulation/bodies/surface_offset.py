@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.fem.mesh.hexmesh import HexMesh, nodal_area_vectors
 
 __all__ = ["element_edge", "face_offsets", "face_triangles", "node_offsets", "outer_surface"]
 
@@ -95,9 +95,8 @@ def node_offsets(
     x = mesh.nodes[quads]
     facing = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
     nodes = np.unique(quads)
-    normal = np.zeros_like(mesh.nodes)
-    np.add.at(normal, quads, facing[:, None, :].repeat(4, axis=1))
-    normal = normal[nodes] / np.linalg.norm(normal[nodes], axis=1, keepdims=True)
+    normal = nodal_area_vectors(mesh.nodes, quads)[nodes]
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     found = Facets(vertices, triangles).project(mesh.nodes[nodes])
     edge = float(np.sqrt(0.5 * np.median(np.linalg.norm(facing, axis=1))))
     height = np.einsum("ni,ni->n", found.closest - mesh.nodes[nodes], found.normal)

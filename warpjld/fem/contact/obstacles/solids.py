@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points, Rigid, RigidMotion, checked_vector
+from warpjld.geometry.box_surface import box_surface
 
 __all__ = ["Box", "Cylinder", "Plane", "Sphere"]
 
@@ -117,8 +118,10 @@ class Box(Rigid):
 
     def _mesh(self, time: float) -> tuple[Points, Ints32]:
         rim = self.edge * (1.0 - np.tan(np.linspace(0.0, 0.25 * np.pi, 6 if self.edge else 1)))
-        vertices, faces = _box_surface([np.concatenate([rim - h, h - rim, [-h, h]]) for h in self._half])
-        return _round_box(vertices, self._half, self.edge).closest + self._middle, faces
+        points, faces = box_surface([np.unique(np.concatenate([rim - h, h - rim, [-h, h]])) for h in self._half])
+        vertices, weld = np.unique(points, axis=0, return_inverse=True)
+        rounded = _round_box(vertices, self._half, self.edge).closest + self._middle
+        return rounded, np.asarray(weld.ravel()[faces], dtype=np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,26 +215,6 @@ def _round_box(points: Array, half: Array, edge: float) -> ClosestPoints:
     normal[deep], closest[deep] = flat, onto
     distance[deep] = beyond[rows, axis] - edge
     return ClosestPoints(distance, closest, normal)
-
-
-def _box_surface(lines: list[Array]) -> tuple[Points, Ints32]:
-    """Surface of a box with a grid over given coordinates on each side; vertices welded."""
-    lines = [np.unique(line) for line in lines]
-    points, faces, start = [], [], 0
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for end in (0, -1):
-            grid = np.stack(np.meshgrid(lines[u], lines[v], indexing="ij"), axis=-1)
-            side = np.full((*grid.shape[:2], 3), lines[axis][end])
-            side[..., u], side[..., v] = grid[..., 0], grid[..., 1]
-            number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape[:2]) + start
-            a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-            quads = np.stack([a, b, c, d] if end else [a, d, c, b], axis=-1).reshape(-1, 4)
-            faces += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
-            points.append(side.reshape(-1, 3))
-            start += len(points[-1])
-    kept, weld = np.unique(np.concatenate(points), axis=0, return_inverse=True)
-    return kept, np.asarray(weld.ravel()[np.concatenate(faces)], dtype=np.int32)
 
 
 def _square(axis: Array) -> tuple[Array, Array]:

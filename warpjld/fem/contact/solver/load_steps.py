@@ -206,8 +206,8 @@ class LoadSteps:
             reached.append(self._instant(target, found, solves, iterations))
             report(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
             solves = iterations = touches = 0
-            if watch and (reason := watch(reached[-1])):
-                return self._end(SolveStatus.STOPPED, reached, reason, step)
+            if watch and (stop := watch(reached[-1])):
+                return self._end(SolveStatus.STOPPED, reached, stop, step)
         return self._end(SolveStatus.CONVERGED, reached, SolveStatus.CONVERGED.value, step)
 
     def _sliding(self, step: LoadStep) -> SolveStatus:
