@@ -1,7 +1,7 @@
-"""A vertex mapped while one chain of joints closes, by the same operators as the animation (R74).
+"""Covering formula at a vertex while one chain of joints closes, with the same operators as the animation (R74).
 
-What moves between two poses of a search is one chain of joints, so the pose need not be computed again: a joint beyond
-k moving ones is carried along by the product of their turns about the axes they had at the start.
+Between two poses of a search only one chain of joints moves, so that the pose need not be computed again: a joint
+distal to k moving ones moves by the product of their rotations about their initial axes.
 """
 
 import warp as wp
@@ -9,7 +9,7 @@ import warp as wp
 wp.set_module_options({"max_unroll": 1, "enable_backward": False})
 
 MOVERS = wp.constant(4)
-"""Joints that may move together, each beyond the one before."""
+"""Largest number of joints of a chain."""
 
 # row k: rotation x y z w and translation of everything beyond k moving joints, and the k-th one's flexion ratio
 Chain = wp.types.matrix(shape=(MOVERS + 1, 8), dtype=float)
@@ -91,7 +91,7 @@ def scaled(w: float, q: wp.quat) -> wp.quat:
 
 @wp.func
 def closing_angle(drives: Drives, r: int, k: int, s: float) -> float:
-    """Angle of the k-th joint when the chain has closed by s."""
+    """Angle of the k-th joint at closing s of the chain [rad]."""
     start = drives.start[r, k]
     stop = drives.stop[r, k]
     angle = start + drives.rate[r, k] * s
@@ -100,7 +100,7 @@ def closing_angle(drives: Drives, r: int, k: int, s: float) -> float:
 
 @wp.func
 def chain_at(posture: Posture, drives: Drives, r: int, s: float) -> Chain:
-    """Turns of everything beyond the moving joints when the chain has closed by s."""
+    """Rigid motions of everything distal to the moving joints at closing s of the chain."""
     chain = Chain()
     chain[0, 3] = 1.0
     q = wp.quat(0.0, 0.0, 0.0, 1.0)
@@ -164,7 +164,7 @@ def joint_flexion_ratio(posture: Posture, drives: Drives, chain: Chain, r: int, 
 
 @wp.func
 def palm_share(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: int, v: int) -> float:
-    """What approaching palm segments add to the offset's length, as a portion of it: λ^(−k) − 1 (R44, C3)."""
+    """Relative increase of the offset's length by approaching palm segments: λ^(−k) − 1 (R44, C3)."""
     total = float(0.0)
     stations = skin.across.shape[1]
     for k in range(skin.palm.shape[1]):
@@ -189,13 +189,13 @@ def palm_share(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: in
 
 @wp.func
 def mapped(skin: Skin, posture: Posture, drives: Drives, r: int, v: int, s: float) -> wp.vec3:
-    """The covering formula at one vertex when the chain has closed by s."""
+    """Covering formula at one vertex at closing s of the chain [m]."""
     return mapped_by(skin, posture, drives, chain_at(posture, drives, r, s), r, v)
 
 
 @wp.func
 def mapped_by(skin: Skin, posture: Posture, drives: Drives, chain: Chain, r: int, v: int) -> wp.vec3:
-    """The covering formula at one vertex when the chain has turned what lies beyond its joints."""
+    """Covering formula at one vertex for given rigid motions of the chain [m]."""
     f = drives.frame[r]
     foot = wp.vec3(0.0)
     for k in range(skin.position.shape[1]):

@@ -1,12 +1,12 @@
-"""Coefficients of the JLD operators at a vertex: what depends on parameters but not on the pose.
+"""Pose-independent coefficients of the JLD operators at a vertex, as functions of the parameters.
 
 Shared by the kernel that packs them for the tiled deformation and by the one that deforms points directly.
 """
 
 import warp as wp
 
-# The functions a^b are steep at a = 0 for b < 1; starting them this far in keeps the slope finite.
 POWER_OFFSET = wp.constant(0.05)
+"""Offset of the argument a of the functions a^b, whose slope at a = 0 is infinite for b < 1."""
 
 
 @wp.func
@@ -22,7 +22,7 @@ def rotation_weights(ratio: float, side: float, proximal: float, distal: float) 
 
 @wp.func
 def rounding(ratio: float, side: float, proximal: float, distal: float) -> wp.vec2:
-    """How far the roundings of the proximal and the distal joint reach (A §6.1, R58–R62): 1 at the joint, 0 where its
+    """Weights of the rounding at the proximal and the distal joint (A §6.1, R58–R62): 1 at the joint, 0 where its
     area ends, with a slope of zero at both, so that no ridge shows there."""
     t = wp.clamp(ratio, 0.0, 1.0)
     at_proximal = wp.max(1.0 - t / wp.max(proximal, 1.0e-6), 0.0)

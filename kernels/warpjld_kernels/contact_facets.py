@@ -1,4 +1,4 @@
-"""Pairs of facets whose boxes meet: those that may touch."""
+"""Broad phase of mortar contact: pairs of facets whose bounding boxes overlap."""
 
 import warp as wp
 
@@ -19,7 +19,8 @@ def facet_pairs(
     counts: wp.array(dtype=wp.int32),
     found: wp.array(dtype=wp.int32),
 ):
-    """Master facets whose boxes meet that of each slave facet, counted, or written from ``starts`` on."""
+    """Master facets whose boxes overlap that of each slave facet: counted, or with ``fill`` written from ``starts``
+    on."""
     facet = wp.tid()
     mine = label[facet]
     query = wp.bvh_query_aabb(bvh, lower[facet], upper[facet])

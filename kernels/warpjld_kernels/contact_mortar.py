@@ -1,7 +1,8 @@
-"""Mortar integrals of facets that face each other.
+"""Mortar integrals of pairs of facets that face each other, and their derivatives.
 
-Each pair of a slave and a master quadrilateral is projected onto the slave's plane, cut (Sutherland and Hodgman) and
-integrated over the common polygon, triangle by triangle: what passes through non-matching meshes is then exact.
+Each pair of a slave and a master quadrilateral is projected onto the slave's plane, clipped (Sutherland–Hodgman) and
+integrated over the common polygon, triangle by triangle with 7-point quadrature. The same C++ code is used with plain
+numbers, and with dual numbers for derivatives.
 """
 
 import warp as wp
@@ -17,7 +18,7 @@ _DOUBLE = """
     auto root = [](double x) { return sqrt(x); };
     auto seed = [](double x, int) { return x; };
 """
-"""Plain numbers."""
+"""Arithmetic of plain numbers."""
 
 _DUAL = (
     EIGHT
@@ -57,7 +58,7 @@ _DUAL = (
     };
 """
 )
-"""Numbers with derivatives."""
+"""Arithmetic of dual numbers: a value with its derivatives by 24 coordinates (forward-mode differentiation)."""
 
 _PAIR = """
     auto shape = [](const Real& s, const Real& t, Real* n) {
@@ -241,8 +242,8 @@ _PAIR = """
     for (int i = 0; i < 32; ++i) out[i] = out[i] * weight;
     out[32] = area * weight;
 """
-"""The integrals of a pair, of either kind of number; ``followed`` is how a place in a quadrilateral follows its corners
-and the point."""
+"""Integrals of a pair with either kind of number. ``followed`` sets the derivatives of reference coordinates found by
+Newton's method, by implicit differentiation."""
 
 _STILL = """
     auto followed = [](const Real (*)[2], Real, Real, const double*, double, double, double, double, double, Real*) {};
@@ -296,7 +297,8 @@ def integrate(
     # out
     integrals: wp.array(dtype=wp.float64),
 ):
-    """∫ N_a N_b and ∫ N_a M_b of each pair, (4 × 4) each, then the area; the area is zero where they do not face."""
+    """∫ N_a N_b and ∫ N_a M_b of each pair, (4 × 4) each, then the area, which is zero for facets that do not face each
+    other; all are faded out with the angle between the facets (``facing``, ``turn``) and with the gap (``reach``)."""
     integrate_pair(first + wp.tid(), pairs, slave, master, x, facing, turn, reach, integrals)
 
 
@@ -336,5 +338,5 @@ def differentiate(
     # out
     derivatives: wp.array(dtype=wp.float64),
 ):
-    """Derivatives of what ``integrate`` finds by the 24 coordinates of each pair's corners, the slave's first."""
+    """Derivatives of the results of ``integrate`` by the 24 coordinates of each pair's corners, the slave's first."""
     differentiate_pair(first + wp.tid(), pairs, slave, master, x, facing, turn, reach, derivatives)

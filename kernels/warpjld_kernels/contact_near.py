@@ -1,4 +1,4 @@
-"""How deep corners of facets are inside other facets' bodies."""
+"""Depth of facet corners inside the body of other facets, by signed distances to triangles."""
 
 import warp as wp
 
@@ -9,7 +9,7 @@ wp.set_module_options(VECTORISED)
 
 @wp.func
 def to_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec3d:
-    """Way to a point from the nearest one of a triangle (Ericson, Real-Time Collision Detection, §5.1.5)."""
+    """Vector from the closest point of a triangle to a point (Ericson, Real-Time Collision Detection, §5.1.5)."""
     zero = wp.float64(0.0)
     least = wp.float64(1e-300)
     ab = b - a
@@ -41,7 +41,7 @@ def to_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec3d:
 
 @wp.func
 def signed(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.float64:
-    """Distance from a triangle, negative behind it."""
+    """Signed distance from a triangle, negative behind it."""
     away = to_triangle(p, a, b, c)
     side = wp.dot(away, wp.cross(b - a, c - a))
     return wp.where(side < wp.float64(0.0), -wp.length(away), wp.length(away))
@@ -58,14 +58,15 @@ def depths(
     label: wp.array(dtype=wp.int32),
     joined: wp.array2d(dtype=wp.uint8),
     x: wp.array(dtype=wp.vec3d),
-    asked: wp.array(dtype=wp.int32),
+    facets: wp.array(dtype=wp.int32),
     reach: wp.float64,
     # out
     depth: wp.array2d(dtype=wp.float64),
 ):
-    """Of each corner of ``mine`` that are asked for, below the nearest of the others whose labels are not joined."""
+    """Depth of each corner of the listed facets of ``mine`` below the closest of the other facets, within ``reach``,
+    whose labels are not joined; 0 outside."""
     i = first + wp.tid()
-    facet = asked[i]
+    facet = facets[i]
     margin = wp.vec3(float(reach), float(reach), float(reach))
     for k in range(4):
         p = x[mine[facet, k]]

@@ -1,4 +1,4 @@
-"""Stiffness of contact points added to a block matrix: Σ_a c_ai c_aj H_a."""
+"""Addition of the contact tangent Σ_a c_ai c_aj H_a to a sparse matrix of 3×3 blocks."""
 
 import warp as wp
 
@@ -18,7 +18,7 @@ def copy_rows(
     # out
     wide: wp.array(dtype=wp.mat33d),
 ):
-    """Blocks of a matrix into a wider pattern, zero elsewhere."""
+    """Copy the blocks of a matrix into a larger sparsity pattern, zero elsewhere."""
     row = first + wp.tid()
     k = rows[row]
     last = rows[row + 1]
@@ -47,7 +47,7 @@ def add_rows(
     # out
     values: wp.array(dtype=wp.mat33d),
 ):
-    """Add to the rows of ``nodes`` what the contact points say that involve them; a row belongs to one thread."""
+    """Add the contributions of all contact points to the rows of ``nodes``; each row is written by one thread."""
     node = nodes[first + wp.tid()]
     for k in range(t_rows[node], t_rows[node + 1]):
         point = t_columns[k]

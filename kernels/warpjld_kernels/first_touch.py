@@ -1,4 +1,5 @@
-"""How far chains of joints close until the first of many vertices touches, and open until none is too deep."""
+"""Smallest closings of joint chains at which the first of many vertices touches, and smallest openings that
+separate."""
 
 import warp as wp
 
@@ -40,7 +41,7 @@ class Hands:
 
 @wp.struct
 class Touch:
-    """How a vertex came to touch, and at which closing."""
+    """Status of a vertex's search, and the closing found."""
 
     status: int
     closing: float
@@ -57,9 +58,9 @@ def seen_from_object(hands: Hands, chain: Chain, r: int, v: int) -> wp.vec3:
 def march(
     hands: Hands, r: int, v: int, target: float, tolerance: float, best: float, first: Hit, speed: float
 ) -> Touch:
-    """First closing below ``best`` at which |distance − target| < tolerance, from the nearest point at the start.
+    """First closing below ``best`` at which |distance − target| < tolerance, from the initial closest point.
 
-    Steps no longer than the distance allows bring the vertex to the first change of sign, which is then halved.
+    Steps bounded by the distance (sphere tracing) lead to the first change of sign, which is then bisected.
     """
     touch = Touch()
     touch.status = NO_CONTACT
@@ -124,11 +125,11 @@ def first_touch(
     status_out: wp.array(dtype=wp.int32),
     closing_out: wp.array(dtype=float),
 ):
-    """Least closing of a chain, row r the digit r mod D, at which one of its digit's vertices touches.
+    """Smallest closing of a chain, row r for digit r mod D, at which one of its digit's vertices touches.
 
-    Of every vertex it is known up to which closing it cannot touch. The least such closing is moved on, by the grid's
-    distance over the vertex's speed; where the grid says no more, the vertex is marched. Once it is later than a touch
-    already found, none of the rest can come before that.
+    For every vertex a closing is kept before which it cannot touch. The smallest of these is advanced by the grid's
+    lower bound of the distance over the vertex's speed; where the grid gives no progress, the vertex is traced exactly.
+    The search ends when the smallest exceeds a contact already found.
     """
     r = wp.tid()
     digit = r % (first_of.shape[0] - 1)
@@ -203,7 +204,7 @@ def distances_at(
     # out
     distance_out: wp.array(dtype=float),
 ):
-    """Signed distances of vertices when their chain has closed by so much, or to its stop."""
+    """Signed distances of vertices at closings of their chains, limited to the chains' ends [m]."""
     i = wp.tid()
     chain = chain_at(hands.posture, hands.drives, row[i], closing)
     local = seen_from_object(hands, chain, row[i], vertex[i])
@@ -225,9 +226,9 @@ def least_opening(
     # out
     by_out: wp.array(dtype=float),
 ):
-    """Least closing of a chain, cut into pieces over and over, that brings its vertices to their least distances.
+    """Smallest opening of a chain at which all its vertices have their least distances, by repeated subdivision.
 
-    The widest where none does.
+    The widest opening if there is none.
     """
     r = wp.tid()
     short = float(0.0)

@@ -1,6 +1,6 @@
 """Bisection for the closing of joints at which a vertex touches an object (A §7.3, R74, R76).
 
-Only the vertex asked for is mapped (see ``closing_chain``).
+Only that vertex is deformed (see ``closing_chain``).
 """
 
 import warp as wp
@@ -45,7 +45,7 @@ class Task:
 
 @wp.func
 def over_facet(solids: Solids, o: int, facet: int, point: wp.vec3) -> Hit:
-    """Distance to a facet's plane (R73); ``point`` is the place in the facet's basis."""
+    """Distance to a facet's plane (R73); ``point`` is the position in the facet's basis."""
     surface = wp.mesh_get(solids.mesh[o])
     a = surface.points[surface.indices[3 * facet]]
     b = surface.points[surface.indices[3 * facet + 1]]
@@ -61,7 +61,7 @@ def over_facet(solids: Solids, o: int, facet: int, point: wp.vec3) -> Hit:
 
 @wp.func
 def top_speed(posture: Posture, drives: Drives, r: int, x: wp.vec3) -> float:
-    """How fast a vertex at x can approach anything, an upper bound [m per unit of closing].
+    """Upper bound on the speed of a vertex at x [m per unit of closing].
 
     Its radius about each moving joint; a third and 3 mm more for what inflation and the other joints may add.
     """
@@ -101,9 +101,9 @@ def search(
 ):
     """First closing s of a chain at which |distance − target| < tolerance, from outside or from inside.
 
-    Steps no longer than the distance allows bring the vertex to the first change of sign, which is then halved. Where
-    there is none, the closest approach is refined, lest a short contact be stepped over. From inside, distances count
-    with the other sign, so that it is the way out that is looked for.
+    Steps bounded by the distance (sphere tracing) lead to the first change of sign, which is then bisected. Without a
+    change of sign, the closest approach is refined, so that a short contact is not missed. From inside, distances have
+    the opposite sign, so that the exit is searched.
     """
     i = first + wp.tid()
     task = Task()

@@ -48,7 +48,7 @@ vector on the CPU, a struct on a GPU."""
 
 
 def prelude(lanes: int) -> str:
-    """What a native function's body begins with."""
+    """C++ prelude of a native function's body: vector types and macros for ``lanes`` numbers."""
     return f"""
 #if defined(__CUDA_ARCH__)
     typedef double Doubles;

@@ -1,4 +1,4 @@
-"""Straight lines beside one object: through it from its surface, and towards it with a whole skin."""
+"""Sphere tracing against one object: rays through it from its surface, and translation of a skin up to it."""
 
 import warp as wp
 
@@ -25,7 +25,7 @@ def follow_through(
     # out: the triangle where a line leaves, −1 where it does not
     face_out: wp.array(dtype=wp.int32),
 ):
-    """Follow a line by steps of its depth until it is less than ``surface`` deep (Hart 1996)."""
+    """Trace rays inside the object by steps of their depth, until less than ``surface`` deep (Hart 1996)."""
     n = wp.tid()
     t = along[n]
     face_out[n] = -1
@@ -72,7 +72,7 @@ def come_near(
     # out
     moved_out: wp.array(dtype=wp.float64),
 ):
-    """How far a skin comes until it is next to the object, by steps of its least distance."""
+    """Largest translation of a skin up to a clearance from the object, by steps of its smallest distance."""
     g = wp.tid()
     count = skins.shape[1]
     moved = wp.float64(0.0)

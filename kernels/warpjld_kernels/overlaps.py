@@ -28,7 +28,7 @@ def overlapping_boxes(
     count_out: wp.array(dtype=wp.int32),
     other_out: wp.array(dtype=wp.int32),
 ):
-    """Count, or list, the later faces that overlap a face's box and share at most one corner with it."""
+    """Count, or list, the faces of higher index whose boxes overlap a face's and that share at most one corner."""
     face = wp.tid()
     count = int(0)
     query = wp.bvh_query_aabb(bvh, lower[face], upper[face])

@@ -1,4 +1,4 @@
-"""How deep groups of points are in poses of a skin."""
+"""Smallest signed distances of hierarchically grouped points to poses of a skin."""
 
 import warp as wp
 
@@ -51,7 +51,7 @@ def set_reach(
     gaps: wp.array2d(dtype=wp.float64),
     reach: wp.array2d(dtype=float),
 ):
-    """How near a point outside must be to what lies below each box to bring a gap down."""
+    """Distance below which a point outside can reduce a gap, for each box of the tree."""
 
 
 @wp.func_native(
@@ -110,7 +110,7 @@ def set_reach(
 def may_matter(
     skins: PosedSkins, reach: wp.array2d(dtype=float), pose: int, point: wp.vec3d, radius: wp.float64
 ) -> bool:
-    """Whether a point within a ball may be near enough to a posed skin; if not, the ball is on one side of it."""
+    """Whether a ball may contain points close enough to a posed skin; if not, it lies on one side of the skin."""
 
 
 @wp.func
@@ -123,7 +123,7 @@ def lower_gap(
     part_of_face: wp.array(dtype=wp.int32),
     gaps: wp.array2d(dtype=wp.float64),
 ):
-    """Bring the gap of the part that is nearest to a point down to its signed distance."""
+    """Reduce the gap of the part closest to a point to the point's signed distance, if that is smaller."""
     face = nearest_triangle(skins.tree, pose, p, limit)
     if face >= 0:
         part = part_of_face[face]

@@ -1,7 +1,7 @@
-"""Poses of one skin, each with a tree of boxes.
+"""Poses of one skin, each with a bounding volume hierarchy.
 
-The trees have one shape, that of the rest pose (``warpjld.grasp.posed_skins``); a pose only fits the boxes anew. Holes
-of the skin are closed by fans, so that a ray from any point meets the skin as often as it winds round the point.
+All hierarchies have the topology of the rest pose's (``warpjld.grasp.posed_skins``) and are refitted for a pose. Holes
+of the skin are closed by fans, so that winding numbers follow from the crossings of a ray.
 """
 
 import warp as wp
@@ -174,7 +174,7 @@ def corner_of(skins: PosedSkins, pose: int, face: int, k: int) -> wp.vec3d:
 """
 )
 def winds_along_x(tree: Tree, pose: int, point: wp.vec3d) -> int:
-    """How often a closed surface winds round a point: the crossings of a ray along x, outwards less inwards."""
+    """Winding number of a closed surface about a point: crossings of a ray along x, outward minus inward."""
 
 
 @wp.kernel

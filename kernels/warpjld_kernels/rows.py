@@ -1,4 +1,4 @@
-"""The covering formula straight from a vertex's rows of coefficients: for few points, and for derivatives."""
+"""Covering formula evaluated directly from a vertex's rows of coefficients, for few points and for derivatives."""
 
 import warp as wp
 
@@ -26,7 +26,7 @@ class Rows:
 
 @wp.func
 def hang(rows: Rows, positions: wp.array2d(dtype=wp.vec3), f: int, v: int) -> wp.vec3:
-    """Σ c_j J_j': the place on the segments from which a vertex is offset."""
+    """Σ c_j J_j': the point on the segments from which a vertex is offset [m]."""
     foot = wp.vec3(0.0)
     for k in range(rows.position.shape[1]):
         foot += rows.position[v, k] * positions[f, rows.position_input[v, k]]
@@ -46,7 +46,7 @@ def turn(rows: Rows, turns: wp.array2d(dtype=wp.quat), f: int, v: int) -> wp.qua
 
 @wp.func
 def growth(rows: Rows, scalars: wp.array2d(dtype=float), f: int, v: int) -> float:
-    """What flexed joints and approaching palm segments add to the offset's length, as a portion of it."""
+    """Relative increase of the offset's length by flexed joints and approaching palm segments, Σ s_i g_i."""
     total = float(0.0)
     for k in range(rows.scale.shape[1]):
         total += rows.scale[v, k] * scalars[f, rows.scale_input[v, k]]
@@ -55,7 +55,7 @@ def growth(rows: Rows, scalars: wp.array2d(dtype=float), f: int, v: int) -> floa
 
 @wp.func
 def muscles(rows: Rows, scalars: wp.array2d(dtype=float), f: int, v: int) -> wp.vec3:
-    """What the muscles add to the offset (R63)."""
+    """Displacement by the muscles, Σ m_i e_i [m] (R63)."""
     total = wp.vec3(0.0)
     for k in range(rows.muscle.shape[1]):
         total += scalars[f, rows.muscle_input[v, k]] * rows.muscle[v, k]

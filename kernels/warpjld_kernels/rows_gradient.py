@@ -1,4 +1,4 @@
-"""The covering formula at chosen vertices with its derivatives: apart, since compiling those takes seconds."""
+"""Differentiable covering formula at chosen vertices, in a module of its own since compiling it takes seconds."""
 
 import warp as wp
 

@@ -1,4 +1,4 @@
-"""Which shell of a surface a ray meets first, and the nearest point of a shell that faces the same way."""
+"""Shells (connected components) of a surface: first face hit by rays, and nearest face with matching orientation."""
 
 import warp as wp
 
@@ -48,7 +48,7 @@ def first_face_met(
     # out
     face_out: wp.array(dtype=wp.int32),
 ):
-    """Face that each ray of unit direction meets first, -1 for none."""
+    """First face hit by each ray of unit direction, -1 for none."""
     i = wp.tid()
     query = wp.mesh_query_ray(mesh, origins[i], directions[i], reach)
     face_out[i] = wp.where(query.result, query.face, -1)

@@ -1,7 +1,7 @@
-"""A grid of exact signed distances to a solid: how near points can be at least, so that few need be measured.
+"""Bounds on signed distances to a solid from a grid of exact ones, so that few points have to be measured.
 
-Distances differ by no more than points are apart: from any node c, d(p) ≥ d(c) − |p − c| and |d(p)| ≤ |d(c)| + |p − c|.
-Nodes are measured when they are first asked for.
+Distances are 1-Lipschitz: for any node c, d(p) ≥ d(c) − |p − c| and |d(p)| ≤ |d(c)| + |p − c|. Nodes are measured on
+first use.
 """
 
 import warp as wp
@@ -46,7 +46,7 @@ def node_distance(solids: Solids, grid: SignedGrid, i: int, j: int, k: int) -> w
 
 @wp.func
 def distance_bounds(solids: Solids, grid: SignedGrid, p: wp.vec3d) -> wp.vec2d:
-    """What a point's signed distance is at least, and what its distance is at most."""
+    """Lower bound of a point's signed distance, and upper bound of its distance [m]."""
     zero = wp.float64(0.0)
     away = wp.max(wp.max(grid.lowest - p, p - grid.highest), wp.vec3d(zero))
     least = wp.length(away)
@@ -95,7 +95,8 @@ def least_by_part(
     # in and out
     gaps: wp.array2d(dtype=wp.float64),
 ):
-    """Smallest signed distance of each part's points to an object, exact: only those that may be it are measured."""
+    """Smallest signed distance of each part's points to an object, exact; only candidates by the bounds are
+    measured."""
     pose = wp.tid()
     count = chosen.shape[0]
     for n in range(count):
@@ -129,7 +130,7 @@ def measure_near(
     face_out: wp.array(dtype=wp.int32),
     point_out: wp.array(dtype=wp.vec3),
 ):
-    """Signed distances, nearest triangles and points; what is surely farther outside than ``limit`` has none."""
+    """Signed distances, nearest triangles and points; none for points farther outside than ``limit`` by the bounds."""
     n = wp.tid()
     two = distance_bounds(solids, grid, points[n])
     face_out[n] = -1
@@ -150,7 +151,7 @@ def least_distances(
     # out
     least_out: wp.array(dtype=float),
 ):
-    """What signed distances of points are at least."""
+    """Lower bounds of the signed distances of points [m]."""
     n = wp.tid()
     two = distance_bounds(solids, grid, wp.vec3d(points[n]))
     least_out[n] = float(two[0])

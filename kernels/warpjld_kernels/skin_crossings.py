@@ -1,4 +1,4 @@
-"""Which triangles of a posed skin pass through others of other parts."""
+"""Intersections between triangles of different parts of a posed skin."""
 
 import warp as wp
 
@@ -118,7 +118,7 @@ def crossings_of(
     task: int,
     counts: wp.array2d(dtype=wp.int32),
 ) -> int:
-    """Count the triangles of other parts that cross one, by part, where no more than a corner is common."""
+    """Count the triangles of other parts that intersect one, by part, unless they share an edge."""
 
 
 @wp.kernel
@@ -135,7 +135,7 @@ def count_crossings(
     # out
     counts_out: wp.array2d(dtype=wp.int32),
 ):
-    """Pairs of triangles that cross between one part and others of a posed skin."""
+    """Numbers of intersecting triangle pairs between one part and others of a posed skin."""
     task = wp.tid()
     part = part_of[task]
     for n in range(first_of_part[part], first_of_part[part + 1]):

@@ -43,7 +43,7 @@ def expanded_winding_number(mesh: wp.uint64, point: wp.vec3, accuracy: float) ->
 
 @wp.func
 def summed_winding_number(mesh: wp.uint64, point: wp.vec3) -> float:
-    """Every triangle's solid angle by the tangent formula of van Oosterom and Strackee."""
+    """Exact winding number: sum of the triangles' solid angles (van Oosterom and Strackee)."""
     surface = wp.mesh_get(mesh)
     total = wp.float64(0.0)
     for t in range(surface.indices.shape[0] // 3):
@@ -60,7 +60,7 @@ def summed_winding_number(mesh: wp.uint64, point: wp.vec3) -> float:
 
 @wp.func
 def winds_round(mesh: wp.uint64, point: wp.vec3) -> bool:
-    """Whether the surface goes round a point more than half a time."""
+    """Whether a point is inside: winding number above one half."""
     number = expanded_winding_number(mesh, point, _ACCURACY)
     if wp.abs(number - 0.5) < _DOUBT:
         number = summed_winding_number(mesh, point)
@@ -69,7 +69,7 @@ def winds_round(mesh: wp.uint64, point: wp.vec3) -> bool:
 
 @wp.func
 def nearest_on_edge(a: wp.vec3d, b: wp.vec3d) -> wp.vec4d:
-    """Point nearest to the origin on the line from a to b, and where on it: 0 at a, 1 at b, both included."""
+    """Point of the segment from a to b nearest to the origin, and its parameter: 0 at a, 1 at b."""
     edge = b - a
     t = -wp.dot(a, edge) / wp.max(wp.dot(edge, edge), wp.float64(1.0e-300))
     t = wp.clamp(t, wp.float64(0.0), wp.float64(1.0))
@@ -79,7 +79,7 @@ def nearest_on_edge(a: wp.vec3d, b: wp.vec3d) -> wp.vec4d:
 
 @wp.func
 def nearest_on_triangle(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec4d:
-    """Point of a triangle nearest to the origin, and the column of ``features`` of what it lies on."""
+    """Point of a triangle nearest to the origin, and the column of ``features`` of its face, edge or corner."""
     zero = wp.float64(0.0)
     normal = wp.cross(b - a, c - a)
     over = wp.min(wp.dot(wp.cross(a, b), normal), wp.dot(wp.cross(b, c), normal))

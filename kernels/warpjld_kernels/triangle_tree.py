@@ -1,4 +1,4 @@
-"""Which triangle of a surface is nearest to a point, by a tree of boxes with eight children each.
+"""Nearest triangle of a surface to a point, by a bounding volume hierarchy with eight children per node.
 
 Eight boxes, or eight triangles, are measured at once. Boxes are compared in float32 with a margin, triangles in
 float64, and of equally near triangles the one of the lowest number counts: where a search starts, and with which bound,

@@ -79,7 +79,7 @@ def test_arrays_are_an_animation(rig: Rig) -> None:
 
 
 def test_arrays_that_do_not_fit_are_refused_by_name(rig: Rig) -> None:
-    with pytest.raises(InputError, match="poses, angles: want one of them"):
+    with pytest.raises(InputError, match="poses, angles: want exactly one of the two"):
         RecordedActor("hand", rig)
     with pytest.raises(InputError, match=r"angles: want finite ones of shape \(F, \d+, 4\), got \(3, 2\)"):
         RecordedActor("hand", rig, angles=np.zeros((3, 2)))

@@ -139,7 +139,7 @@ def test_a_ball_dropped_into_a_bowl_rests_at_its_bottom() -> None:
     assert path.on == ("bowl",)
     middle = path.places[-1].position[0]
     assert np.linalg.norm(middle - [0.0, -0.05, 0.0]) < 1e-3
-    assert "comes to rest on bowl" in path.told()
+    assert "comes to rest on bowl" in path.summary()
 
 
 def test_what_has_nothing_below_leaves_the_stage() -> None:
@@ -150,7 +150,7 @@ def test_what_has_nothing_below_leaves_the_stage() -> None:
     path = drop(things, 30)["ball"]
     assert path.left is not None
     assert path.rests is None
-    assert "leaves the stage" in path.told()
+    assert "leaves the stage" in path.summary()
 
 
 def run(text: str) -> tuple[Scene, Simulation]:

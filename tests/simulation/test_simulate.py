@@ -70,7 +70,7 @@ def test_what_cannot_be_is_refused_by_name(pressed: Simulation) -> None:
     nothing = RecordedAnimation()
     with pytest.raises(InputError, match=r"friction: want coefficients of 0 or more, got -0.5"):
         simulate(ContactSpecification(everywhere=-0.5, pressing=SolveSpecification(0, 1)), nothing)
-    with pytest.raises(InputError, match="specification: want its pressing"):
+    with pytest.raises(InputError, match="specification: want pressing set"):
         simulate(ContactSpecification(), nothing)
     asked = ContactSpecification(physical={"ball": ObjectMaterial()}, pressing=SolveSpecification(0, 1))
     with pytest.raises(InputError, match="there is no object ball; there are none"):

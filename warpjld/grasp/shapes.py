@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.box_surface import box_surface
 from warpjld.grasp.objects import GraspObject, make_object
 
 __all__ = ["SHAPES", "ball", "box", "cylinder", "glass", "plate"]
@@ -59,20 +60,8 @@ def box(
     _check(width=width, height=height, depth=depth, edge=edge)
     size = np.array([width, height, depth])
     steps = [np.linspace(-0.5, 0.5, int(np.clip(round(s / edge), 1, _MOST)) + 1) for s in size]
-    points, faces, start = [], [], 0
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for end in (-0.5, 0.5):
-            grid = np.stack(np.meshgrid(steps[u], steps[v], indexing="ij"), axis=-1)
-            side = np.full((*grid.shape[:2], 3), end)
-            side[..., u], side[..., v] = grid[..., 0], grid[..., 1]
-            number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape[:2]) + start
-            a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-            quads = np.stack([a, b, c, d] if end > 0 else [a, d, c, b], axis=-1).reshape(-1, 4)
-            faces += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
-            points.append(side.reshape(-1, 3) * size)
-            start += len(points[-1])
-    return make_object(name, np.concatenate(points), np.concatenate(faces), origin="box")
+    points, faces = box_surface(steps)
+    return make_object(name, points * size, faces, origin="box")
 
 
 def cylinder(

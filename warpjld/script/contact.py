@@ -144,13 +144,9 @@ class _StagedObject:
 
     def obstacle(self, start: float) -> Obstacle:
         from warpjld.fem.contact.obstacles.meshes import Keyframed
-        from warpjld.simulation.bodies.obstacle import rigid_obstacle
+        from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 
-        def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            here = self.place(start + time)
-            return here.position[0], here.rotation[0]
-
-        prop = self.prop
+        prop, motion = self.prop, placed_motion(self.place, start)
         if prop.shapes is not None:
             return Keyframed(prop.thing.faces, prop.shapes.frames - start, prop.shapes.vertices, motion)
         return rigid_obstacle(prop.thing, motion) if prop.barred is None else prop.barr(start, motion)

@@ -1,6 +1,7 @@
-"""Contact simulated over the frames of an animation (B §3.3, §3.4, R91–R130): ``simulate.simulate``.
+"""Quasi-static contact simulation over the frames of an animation (B §3.3, §3.4, R91–R130): ``simulate.simulate``.
 
-Data flow one way: a ``specification`` and an ``animation`` become ``bodies``; ``solve`` finds equilibria frame by frame
-and asks ``grip`` for grips and corrections; ``display`` and ``report`` show and tell what came of it. No module here
-knows scripts: what is found comes back as results, and edits of the animation as ``AngleEdit``s.
+Data flows one way: a ``specification`` and an ``animation`` are turned into ``bodies``; ``solve`` finds the equilibria
+frame by frame and calls ``grip`` for grip searches and corrections; ``report`` and ``display`` make tables, the verdict
+and visible surfaces from the results. No module here depends on scripts: results are returned, changes of the animation
+as ``AngleEdit``s.
 """

@@ -1,7 +1,7 @@
-"""What moves over time as a simulation asks for it: actors with joints and skin, and objects; and edits laid over it.
+"""Protocols of the animation that a simulation samples (actors with joints and skin, objects), and edits of it.
 
-Times are frame numbers, whole or not. A script's actors and objects implement these protocols, and so do arrays
-(``warpjld.simulation.recorded``): a simulation knows of nothing behind them.
+Times are frame numbers and may be fractional. The actors and objects of a script implement these protocols, and so do
+those made of arrays (``warpjld.simulation.recorded``).
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ __all__ = ["ActorAnimation", "AngleEdit", "Animation", "ObjectAnimation"]
 
 @dataclass(frozen=True)
 class AngleEdit:
-    """One joint that flexes otherwise than the animation has it.
+    """Change of one joint's flexion relative to the animation.
 
     Attributes:
-        actor: Whose.
-        joint: As the skeleton numbers it.
-        kept: Frame up to which all stays as it is.
-        frame: Frame at which the joint flexes by ``value``; None: wherever it holds, after ``kept``, the angle it has
-            there.
+        actor: Name of the actor.
+        joint: Index of the joint in its skeleton.
+        kept: Last frame that the edit leaves unchanged.
+        frame: Frame at which the joint flexes by ``value``; None: every frame after ``kept`` whose angle equals the one
+            at ``kept``.
         value: Flexion [rad].
     """
 
@@ -44,85 +44,85 @@ class AngleEdit:
 
 
 class ActorAnimation(Protocol):
-    """A rig that moves."""
+    """An animated rig."""
 
     @property
     def name(self) -> str:
-        """Of the actor."""
+        """Name of the actor."""
         ...
 
     @property
     def rig(self) -> Rig:
-        """Surface and skeleton at rest; flexion axes and limits as they hold in the animation."""
+        """Surface and skeleton at rest, with the flexion axes and limits that the animation uses."""
         ...
 
     @property
     def skeleton(self) -> Skeleton:
-        """That of the rig."""
+        """Skeleton of the rig."""
         ...
 
     @property
     def covering(self) -> Covering:
-        """Its skin bound to its skeleton."""
+        """Binding of its skin to its skeleton."""
         ...
 
     @property
     def bendable(self) -> bool:
-        """Whether its joints have angles, which a search or a correction may change."""
+        """Whether it is driven by joint angles, which searches and corrections may change."""
         ...
 
     def pose(self, frame: float) -> Poses:
-        """One pose."""
+        """Pose at a frame (a batch of one)."""
         ...
 
     def angles(self, frame: float) -> NDArray[np.float64]:
-        """Joint angles [rad], shape (J, 4); only where it is bendable."""
+        """Joint angles at a frame [rad], shape (J, 4); only if it is bendable."""
         ...
 
     def posed(self, angles: NDArray[np.float64], frame: float) -> Poses:
-        """The pose of other angles (J, 4), its root as it is at a frame; only where it is bendable."""
+        """Pose of given joint angles (J, 4), with the root of a frame; only if it is bendable."""
         ...
 
     def skin(self, frame: float) -> NDArray[np.float64]:
-        """Its surface as the covering has it [m], shape (V, 3)."""
+        """Surface deformed by the covering at a frame [m], shape (V, 3)."""
         ...
 
 
 class ObjectAnimation(Protocol):
-    """An object on the stage."""
+    """An animated object."""
 
     @property
     def name(self) -> str:
-        """Of the object."""
+        """Name of the object."""
         ...
 
     @property
     def thing(self) -> GraspObject:
-        """Its surface in its own frame, and where it stands at first."""
+        """Its surface in its own frame, with its initial placement."""
         ...
 
     def place(self, frame: float) -> Places:
-        """One placement."""
+        """Placement at a frame (a batch of one)."""
         ...
 
     def obstacle(self, start: float) -> Obstacle:
-        """It as something that does not give way; the obstacle's time is in frames from ``start``."""
+        """The object as a rigid obstacle; times of the obstacle are in frames from ``start``."""
         ...
 
 
 class Animation(Protocol):
-    """All that moves, by name; no actor and object of one name."""
+    """Actors and objects by name; names are unique across both."""
 
     @property
     def actors(self) -> Mapping[str, ActorAnimation]:
-        """In their order on the stage."""
+        """Actors in scene order."""
         ...
 
     @property
     def objects(self) -> Mapping[str, ObjectAnimation]:
-        """In their order on the stage."""
+        """Objects in scene order."""
         ...
 
     def edited(self, edits: Sequence[AngleEdit]) -> Animation:
-        """The same with edits laid over its actors, which are bendable; what does not change stays the same object."""
+        """A copy with edits applied to its (bendable) actors; whatever does not change remains the same instance."""
         ...

@@ -1,4 +1,4 @@
-"""Free fall before and after what is solved as contact (B §3.4, R139)."""
+"""Free fall of unsupported objects before and after the frames solved as contact (B §3.4, R139)."""
 
 from __future__ import annotations
 
@@ -26,13 +26,19 @@ from warpjld.simulation.specification import ContactSpecification, SolveSpecific
 __all__ = ["after_contact", "before_contact", "rests_rigidly"]
 
 _TRIAL = 1
-"""Halvings of the step in which what has fallen gives way to its weight: what does not rest then is left rigid."""
+"""Most halvings of the load step in the trial equilibrium of a fallen body under its weight; without convergence it
+stays rigid."""
 
 
 def before_contact(
     specification: ContactSpecification, animation: Animation, request: SolveSpecification
 ) -> tuple[ContactSpecification, Animation, StartFrame]:
-    """What is asked of contact and what moves, once what nothing holds has fallen, and where it starts."""
+    """Let unsupported deformable objects fall rigidly until they rest or touch a hand.
+
+    Returns:
+        The specification without bodies that take no part in contact, the animation with the falls applied, and the
+        start frame of the contact solve.
+    """
     names = falling_names(specification, request)
     if not names:
         return specification, animation, find_start(animation, specification, request)
@@ -53,7 +59,11 @@ def before_contact(
 def after_contact(
     solved: SolveResult, specification: ContactSpecification, request: SolveSpecification, before: StartFrame
 ) -> tuple[StartFrame, SolveResult]:
-    """Where what hands no longer hold goes to, where that ended the search for equilibria."""
+    """Let objects fall that the hands no longer hold, if that is why the contact solve ended.
+
+    Returns:
+        The start frame extended by the falls, and the result with ``released`` set; both unchanged if nothing falls.
+    """
     weights = any(specification.pull) and request.method != "paper"
     if solved.status not in (SolveStatus.UNHELD, SolveStatus.SLIDING) or not weights or solved.model.animation is None:
         return before, solved
@@ -63,19 +73,22 @@ def after_contact(
     first = solved.frames[-1].frame if solved.frames else solved.start
     known = (solved.model.animation, specification, request, list(bodies))
     paths = follow_falls(*known, released=bodies, first=first)
-    if not any(path.told() for path in paths.values()):
+    if not any(path.summary() for path in paths.values()):
         return before, solved
     moved = dict(before.moved)
     for name, path in paths.items():
         frames, places = moved.get(name, ([], []))
         moved[name] = ([*frames, *path.frames], [*places, *path.places])
-    told = tuple(text for path in paths.values() if (text := path.told()))
-    return replace(before, moved=moved, falls=(*before.falls, *told)), replace(solved, released=first)
+    falls = tuple(text for path in paths.values() if (text := path.summary()))
+    return replace(before, moved=moved, falls=(*before.falls, *falls)), replace(solved, released=first)
 
 
 def rests_rigidly(model: ContactModel, before: StartFrame, frames: Sequence[float]) -> str:
-    """Why how all that deforms, has fallen and rests gives way to its own weight is not known, in words; nothing where
-    it is, or where anything else is to be solved."""
+    """Reason why fallen bodies at rest are shown rigid: their trial equilibrium under their weight did not converge.
+
+    Returns:
+        The text; empty if the trial converged, ended as unheld or sliding, or if anything else has to be solved.
+    """
     fallen = all(one.name in before.moved and not one.states for one in model.objects)
     if not before.falls or model.hands or not fallen or not frames or not model.pairs:
         return ""

@@ -1,4 +1,4 @@
-"""Materials by name, with where their constants are from, and Coulomb's coefficients of pairs of them (R109).
+"""Catalogue of materials with sources of their constants, and Coulomb friction coefficients of pairs (R109).
 
 Sources:
 
@@ -10,7 +10,8 @@ Sources:
   static ones of dry surfaces.
 - Seo: N. J. Seo, T. J. Armstrong, P. Drinkaus 2009, A comparison of two methods of measuring static coefficient of
   friction at low normal forces, Ergonomics 52, 121–135: skin on aluminium and on rubber.
-- Poisson's ratios are the usual ones of their kinds: 0.49 for what hardly changes its volume, 0.3 for metals.
+- Poisson's ratios are assumed, at values usual for the kind of material: 0.49 for nearly incompressible ones, 0.3 for
+  metals.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ __all__ = ["FRICTIONS", "MATERIALS", "NamedMaterial", "pair_friction"]
 
 @dataclass(frozen=True)
 class NamedMaterial:
-    """A material.
+    """Constants of a material.
 
     Attributes:
-        law: Constitutive law: one for large turns, also of what is hardly strained.
+        law: Constitutive law, valid under large rotations also for stiff materials.
         young: Young's modulus at small strain [Pa].
         poisson: Poisson's ratio.
         density: [kg/m³].
-        source: Where the modulus and the density are from.
+        source: Source of modulus and density.
     """
 
     law: Literal["neo-hooke"]
@@ -54,7 +55,7 @@ MATERIALS: dict[str, NamedMaterial] = {
     "aluminium": NamedMaterial("neo-hooke", 75e9, 0.33, 2700.0, "CUED: aluminium alloys, 68–82 GPa"),
     "steel": NamedMaterial("neo-hooke", 207.5e9, 0.29, 7850.0, "CUED: low carbon steels, 200–215 GPa"),
 }
-"""By name."""
+"""Materials by name."""
 
 FRICTIONS: dict[frozenset[str], tuple[float, str]] = {
     frozenset({"skin", "aluminium"}): (0.6, "Seo"),
@@ -64,11 +65,11 @@ FRICTIONS: dict[frozenset[str], tuple[float, str]] = {
     frozenset({"glass"}): (0.94, "Serway"),
     frozenset({"wood"}): (0.4, "Serway: 0.25–0.5"),
 }
-"""Coulomb's coefficients of pairs, and where they are from."""
+"""Coulomb friction coefficient and source by pair of materials; one name alone: the material on itself."""
 
 
 def pair_friction(one: str | None, other: str | None) -> float | None:
-    """Coulomb's coefficient of two materials; None where it is not known."""
+    """Coulomb friction coefficient of two materials; None if it is not known."""
     if one is None or other is None:
         return None
     found = FRICTIONS.get(frozenset({one, other}))

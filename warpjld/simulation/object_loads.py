@@ -1,4 +1,4 @@
-"""Forces that are asked for on objects over keys: on points, on faces, of turning (B eqs. 1–4, R97)."""
+"""Keyed external loads on objects: nodal forces, surface tractions and pressures, rotation (B eqs. 1–4, R97)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ __all__ = ["ObjectLoad", "ObjectSpin"]
 
 @dataclass(eq=False)
 class ObjectLoad:
-    """A load on points of an object, or on the faces of its outside between them.
+    """A load on points of an object, or on the faces of its outer surface between them.
 
     Attributes:
-        kind: ``force``, in all on these points [N]; ``traction``, on these faces, of constant direction, or
-            ``pressure``, against them as they turn, per area at rest and as it is [Pa].
-        points: Which.
-        tracks: Keys of ``x``, ``y``, ``z``; of ``pressure`` alone.
+        kind: ``force``: total force on the points [N]; ``traction``: dead load of constant direction per area at rest
+            [Pa]; ``pressure``: follower load against the faces, per current area [Pa].
+        points: Points it acts on, or whose faces it acts on.
+        tracks: Keys of ``x``, ``y``, ``z``, or of ``pressure`` only.
     """
 
     kind: Literal["force", "traction", "pressure"]
@@ -29,19 +29,19 @@ class ObjectLoad:
     tracks: dict[str, Track] = field(default_factory=dict)
 
     def at(self, channel: str, frame: float) -> float:
-        """Its value at a frame; nothing before its first key."""
+        """Value of a channel at a frame [N or Pa]; 0 before its first key."""
         track = self.tracks.get(channel)
         return 0.0 if track is None or frame < track.keys[0].frame else float(track.spline(frame))
 
 
 @dataclass(eq=False)
 class ObjectSpin:
-    """An object that turns steadily as seen from outside, and bears the centrifugal force while it stands here.
+    """Steady rotation of an object, modelled as centrifugal force in the rotating frame.
 
     Attributes:
-        axis: Its direction, of any length but zero.
-        point: A point on it, on the stage [m].
-        track: Keys of its speed [rad/s].
+        axis: Direction of the axis, of any length but zero.
+        point: A point on the axis in world coordinates [m].
+        track: Keys of the angular speed [rad/s].
     """
 
     axis: tuple[float, float, float]
@@ -49,5 +49,5 @@ class ObjectSpin:
     track: Track
 
     def at(self, frame: float) -> float:
-        """Speed at a frame [rad/s]; nothing before its first key."""
+        """Angular speed at a frame [rad/s]; 0 before its first key."""
         return 0.0 if frame < self.track.keys[0].frame else float(self.track.spline(frame))

@@ -1,4 +1,4 @@
-"""What a deformable object is made of (R92, R109)."""
+"""Material and wall of a deformable object (R92, R109)."""
 
 from __future__ import annotations
 
@@ -15,27 +15,29 @@ if TYPE_CHECKING:
 __all__ = ["LAWS", "Law", "ObjectMaterial", "SourceLocation"]
 
 SourceLocation = tuple[str, int, int]
-"""File, line and column of a command, for messages."""
+"""File, line and column of a script command, for messages."""
 
 Law = Literal["linear", "neo-hooke", "mooney-rivlin"]
 LAWS: tuple[Law, ...] = ("linear", "neo-hooke", "mooney-rivlin")
+"""Names of the constitutive laws."""
 
 
 @dataclass(frozen=True)
 class ObjectMaterial:
-    """An object that deforms (R92, R109).
+    """Material, wall and inner pressure of a deformable object (R92, R109).
 
     Attributes:
         law: Constitutive law.
         young: Young's modulus at small strain [Pa].
         poisson: Poisson's ratio at small strain.
         density: [kg/m³].
-        wall: Thickness of its wall [m]; 0 for a solid object.
-        pressure: Inside a hollow one, above that outside [Pa] (R111).
-        element: Edge length of its elements [m]; None chooses.
-        made_of: Its name in the catalogue of materials, if it is of one: what friction goes by.
-        prestress: Stress at rest in its own axes, xx yy zz xy yz zx [Pa] (R98): what is not held relaxes it.
-        where: Place in a script, for messages.
+        wall: Thickness of the wall of a hollow object [m]; 0 for a solid one.
+        pressure: Gauge pressure inside a hollow object [Pa] (R111).
+        element: Edge length of its elements [m]; None chooses it from the object's size.
+        made_of: Name in the catalogue of materials, if it is from there; determines its friction coefficients.
+        prestress: Initial Cauchy stress in the object's axes, xx yy zz xy yz zx [Pa] (R98); relaxes where the object
+            is not constrained.
+        where: Script location, for messages.
 
     Examples:
         >>> rubber = wj.ObjectMaterial(young=4e5, wall=0.003, pressure=8000)  # Pa, m, Pa
@@ -66,10 +68,10 @@ class ObjectMaterial:
             raise InputError("pressure: only a hollow object has an inside to put under pressure")
 
     def material(self) -> Material:
-        """The law with its constants.
+        """Constitutive law with its constants.
 
         Raises:
-            InputError: A modulus, ratio or density that no material has.
+            InputError: Modulus, Poisson's ratio or density out of range.
         """
         from warpjld.fem import LinearElastic, MooneyRivlin, NeoHooke
 
@@ -77,6 +79,6 @@ class ObjectMaterial:
             return LinearElastic(self.young, self.poisson, self.density)
         if self.law == "neo-hooke":
             return NeoHooke(self.young, self.poisson, self.density)
-        # Mooney and Rivlin's constants in the usual ratio of rubber, of the same modulus at small strain
+        # c10 : c01 = 4 : 1, usual for rubber; 2 (c10 + c01) is the shear modulus at small strain
         shear = self.young / (2.0 * (1.0 + self.poisson))
         return MooneyRivlin(0.4 * shear, 0.1 * shear, self.poisson, self.density)

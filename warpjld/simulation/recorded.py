@@ -1,6 +1,6 @@
-"""An animation made of arrays: poses or joint angles of actors, places of objects, one row a frame.
+"""Animation made of arrays: poses or joint angles of actors and placements of objects, one row per frame.
 
-Between two rows everything goes straight from one to the other; before the first and after the last it stays.
+Rows are interpolated linearly; before the first and after the last row values are constant.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from warpjld.fem.contact import Obstacle
 from warpjld.grasp import GraspObject, Places, make_object
 from warpjld.rig import Rig
 from warpjld.simulation.animation import AngleEdit
-from warpjld.simulation.bodies.obstacle import rigid_obstacle
+from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 from warpjld.skeleton.between import poses_between
 from warpjld.skeleton.channels import FLEXION
@@ -28,7 +28,7 @@ __all__ = ["RecordedActor", "RecordedAnimation", "RecordedObject"]
 
 
 def _between(rows: NDArray[np.float64], at: float) -> NDArray[np.float64]:
-    """Rows (F, …) at a place between them."""
+    """Linear interpolation of rows (F, …) at a fractional row index, clamped to the ends."""
     at = float(np.clip(at, 0.0, len(rows) - 1.0))
     before = int(at)
     after, part = min(before + 1, len(rows) - 1), at - before
@@ -36,20 +36,20 @@ def _between(rows: NDArray[np.float64], at: float) -> NDArray[np.float64]:
 
 
 class RecordedActor:
-    """A rig with an array of poses, or of joint angles, one row for each frame from ``first`` on.
+    """A rig animated by an array of poses or joint angles, one row per frame from ``first`` on.
 
     Args:
-        name: Of the actor.
+        name: Name of the actor.
         rig: Surface and skeleton.
-        poses: Final positions of its skeleton, F of them.
-        angles: Joint angles instead [rad], shape (F, J, 4), channels as in ``CHANNELS``: searches and corrections may
-            change them.
+        poses: F poses of its skeleton.
+        angles: Joint angles instead of poses [rad], shape (F, J, 4), channels as in ``CHANNELS``; searches and
+            corrections may change them.
         root: With angles: displacement of the root from rest [m], shape (F, 3) or (3,).
-        covering: Its skin bound to its skeleton; bound here where left out.
+        covering: Binding of its skin to its skeleton; made on first use if left out.
         first: Frame of the first row.
 
     Raises:
-        InputError: Neither or both of poses and angles, or another shape.
+        InputError: Neither or both of poses and angles, a wrong shape, or values that are not finite.
 
     Examples:
         >>> import numpy as np
@@ -72,7 +72,7 @@ class RecordedActor:
     ) -> None:
         self.name, self.rig, self._first = name, rig, first
         if (poses is None) == (angles is None):
-            raise InputError("poses, angles: want one of them")
+            raise InputError("poses, angles: want exactly one of the two")
         if poses is not None and (len(poses) < 1 or poses.positions.shape[1:] != (len(rig.skeleton), 3)):
             raise InputError(f"poses: want shape (F, {len(rig.skeleton)}, 3), got {poses.positions.shape}")
         self._poses = poses
@@ -96,41 +96,41 @@ class RecordedActor:
 
     @property
     def skeleton(self) -> Skeleton:
-        """That of the rig."""
+        """Skeleton of the rig."""
         return self.rig.skeleton
 
     @cached_property
     def covering(self) -> Covering:
-        """Its skin bound to its skeleton."""
+        """Binding of its skin to its skeleton."""
         return self._covering or bind_rig(self.rig)
 
     @property
     def bendable(self) -> bool:
-        """Whether it was given angles."""
+        """Whether it is driven by joint angles."""
         return self._angles is not None
 
     def pose(self, frame: float) -> Poses:
-        """One pose."""
+        """Pose at a frame (a batch of one)."""
         if self._poses is not None:
             return poses_between(self._poses, np.array([frame - self._first]))
         return self.posed(self.angles(frame), frame)
 
     def angles(self, frame: float) -> NDArray[np.float64]:
-        """Joint angles [rad], shape (J, 4)."""
+        """Joint angles at a frame [rad], shape (J, 4)."""
         assert self._angles is not None
         return _between(self._angles, frame - self._first)
 
     def posed(self, angles: NDArray[np.float64], frame: float) -> Poses:
-        """The pose of other angles (J, 4), its root as it is at a frame."""
+        """Pose of given joint angles (J, 4), with the root of a frame."""
         root = _between(self._root, frame - self._first)
         return poses_from_angles(self.rig.skeleton, angles[None], root_position=root[None])
 
     def skin(self, frame: float) -> NDArray[np.float64]:
-        """Its surface as the covering has it [m], shape (V, 3)."""
+        """Surface deformed by the covering at a frame [m], shape (V, 3)."""
         return self.covering.deform(self.pose(frame))[0].astype(np.float64)
 
     def edited(self, edits: Sequence[AngleEdit]) -> RecordedActor:
-        """The same with other angles in the rows that edits are about."""
+        """A copy with edits applied to its rows of angles."""
         assert self._angles is not None
         angles, frames = self._angles.copy(), self._first + np.arange(len(self._angles))
         for edit in edits:
@@ -147,17 +147,18 @@ class RecordedActor:
 
 @dataclass(frozen=True, eq=False)
 class RecordedObject:
-    """An object with an array of places, one row for each frame from ``first`` on; one row where it stands still.
+    """An object with an array of placements, one row per frame from ``first`` on; one row for an object at rest.
 
     Attributes:
-        name: Of the object.
-        surface: Its surface in its own frame [m]: a ``trimesh.Trimesh``, or a ``GraspObject`` as shapes and files give.
-        positions: Where its origin lies [m], shape (F, 3) or (3,).
+        name: Name of the object.
+        surface: Its surface in its own frame [m]: a ``trimesh.Trimesh``, or a ``GraspObject`` from ``shapes`` or a
+            file.
+        positions: Position of its origin [m], shape (F, 3) or (3,).
         rotations: Unit quaternions x, y, z, w, shape (F, 4) or (4,).
         first: Frame of the first row.
 
     Raises:
-        InputError: Other shapes, or a surface that is none.
+        InputError: Wrong shapes, or an invalid surface.
 
     Examples:
         >>> thing = wj.RecordedObject("ball", wj.shapes.ball(0.06), positions=[[0, 0, 0], [0, 0.1, 0]])
@@ -183,14 +184,14 @@ class RecordedObject:
 
     @cached_property
     def thing(self) -> GraspObject:
-        """Its surface, standing where it is at first."""
+        """Its surface, with its initial placement."""
         thing = self.surface
         if not isinstance(thing, GraspObject):
             thing = make_object(self.name, np.asarray(thing.vertices, np.float64), np.asarray(thing.faces, np.int32))
         return replace(thing, place=self._places[:1])
 
     def place(self, frame: float) -> Places:
-        """One placement."""
+        """Placement at a frame (a batch of one)."""
         at, places = frame - self.first, self._places
         turns = places.rotation
         ends = np.clip([np.floor(at), np.floor(at) + 1.0], 0, len(places) - 1).astype(int)
@@ -199,24 +200,19 @@ class RecordedObject:
         return Places.of(_between(places.position, at), _between(turns, at))
 
     def obstacle(self, start: float) -> Obstacle:
-        """It as something that does not give way; the obstacle's time is in frames from ``start``."""
-
-        def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            here = self.place(start + time)
-            return here.position[0], here.rotation[0]
-
-        return rigid_obstacle(self.thing, motion)
+        """The object as a rigid obstacle; times of the obstacle are in frames from ``start``."""
+        return rigid_obstacle(self.thing, placed_motion(self.place, start))
 
 
 class RecordedAnimation:
-    """Actors and objects of arrays.
+    """Animation of actors and objects made of arrays.
 
     Args:
-        actors: Of different names.
-        objects: Of different names, none that of an actor.
+        actors: Actors with unique names.
+        objects: Objects with unique names, different from those of the actors.
 
     Raises:
-        InputError: Two of one name.
+        InputError: A name is used twice.
 
     Examples:
         >>> stage = wj.RecordedAnimation(objects=[wj.RecordedObject("ball", wj.shapes.ball(0.06))])
@@ -227,7 +223,7 @@ class RecordedAnimation:
     def __init__(self, actors: Iterable[RecordedActor] = (), objects: Iterable[RecordedObject] = ()) -> None:
         people, things = list(actors), list(objects)
         self.actors = {actor.name: actor for actor in people}
-        self.objects = {one.name: one for one in things}
+        self.objects = {thing.name: thing for thing in things}
         if len({*self.actors, *self.objects}) < len(people) + len(things):
             raise InputError("actors, objects: want a name of its own for each")
 
@@ -237,7 +233,7 @@ class RecordedAnimation:
         )
 
     def edited(self, edits: Sequence[AngleEdit]) -> RecordedAnimation:
-        """The same with edits laid over its actors."""
+        """A copy with edits applied to its actors."""
         out = RecordedAnimation(objects=self.objects.values())
         for name, actor in self.actors.items():
             mine = [edit for edit in edits if edit.actor == name]

@@ -1,4 +1,4 @@
-"""Contact simulated in Python: ``simulate(specification, animation)`` (B §3.3, §3.4, R91–R130).
+"""Python interface of contact simulation: ``simulate(specification, animation)`` (B §3.3, §3.4, R91–R130).
 
 Example::
 
@@ -6,7 +6,7 @@ Example::
     from warpjld.simulation.simulate import simulate
     from warpjld.simulation.specification import ContactSpecification, FleshMaterial, SolveSpecification
 
-    hand = RecordedActor("hand", rig, angles=angles)  # (F, J, 4) [rad], one row a frame
+    hand = RecordedActor("hand", rig, angles=angles)  # (F, J, 4) [rad], one row per frame
     plate = RecordedObject("plate", trimesh.creation.box((0.04, 0.006, 0.04)), positions=(0.034, -0.0275, -0.165))
     contact = ContactSpecification(
         flesh={"hand": FleshMaterial(digits=("index",))}, pressing=SolveSpecification(0, 8, every=2)
@@ -56,10 +56,10 @@ from warpjld.simulation.specification import ContactSpecification, SolveSpecific
 __all__ = ["KEPT", "Keep", "Simulation", "VisiblePressure", "simulate"]
 
 KEPT = "contact-state.npz"
-"""State file of a run that asked for none, where what it solved would be lost."""
+"""Name of the state file of a run that asked for none, written on request so that its frames are not lost."""
 
 Keep = Callable[[], Path | None]
-"""Keeps what is solved so far; see ``simulate``."""
+"""Writes the frames solved so far into the state file and returns its path; see ``simulate``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +67,10 @@ class VisiblePressure:
     """Contact pressure on a visible surface at a frame.
 
     Attributes:
-        vertices: Of the surface, split where anything ever presses on it [m], shape (V, 3); the first are its own.
-        triangles: Shape (T, 3).
-        pressure: [Pa], shape (V,); its integral over the surface is the force that presses.
+        vertices: Vertices of the surface, refined where it is ever in contact [m], shape (V, 3); the original ones
+            come first.
+        triangles: Triangles of the refined surface, shape (T, 3).
+        pressure: [Pa], shape (V,); its integral over the surface is the normal contact force.
     """
 
     vertices: NDArray[np.float64]
@@ -79,14 +80,14 @@ class VisiblePressure:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """What came of a simulation of contact: F frames solved, of N nodes of all bodies.
+    """Result of a contact simulation of F solved frames, of N nodes of all bodies.
 
     Attributes:
-        solved: Frames as they were solved, with the model, edits of the animation, grips and corrections.
-        surfaces: Shapes and pressures of visible surfaces, at any frame from the start on.
-        rows: The table: one row for each frame and digit.
-        verdict: In words.
-        notes: What was found on the way.
+        solved: Solved frames, with the model, edits of the animation, grips and corrections.
+        surfaces: Shapes and pressures of the visible surfaces, at any frame from the start on.
+        rows: Table with one row per frame and digit.
+        verdict: Status of the run, with its explanation in words.
+        notes: Remarks on meshes, convergence and visible overlaps, in words.
     """
 
     solved: SolveResult
@@ -101,51 +102,51 @@ class Simulation:
 
     @property
     def model(self) -> ContactModel:
-        """What was solved; ``model.spans[name]`` are the rows of a body's nodes."""
+        """Model that was solved; ``model.spans[name]`` are the rows of a body's nodes."""
         return self.solved.model
 
     @property
     def grips(self) -> tuple[FoundGrip, ...]:
-        """Grips that were searched for."""
+        """Results of the grip searches."""
         return self.solved.grips
 
     @property
     def frames(self) -> NDArray[np.float64]:
-        """Numbers of the frames that were solved, shape (F,)."""
-        return np.array([one.frame for one in self.solved.frames])
+        """Numbers of the solved frames, shape (F,)."""
+        return np.array([solved.frame for solved in self.solved.frames])
 
     @property
     def displacement(self) -> NDArray[np.float64]:
         """Displacements of all nodes from rest, ``model.body.mesh.nodes`` [m], shape (F, N, 3)."""
-        nothing = np.zeros((0, *self.model.body.mesh.nodes.shape))
-        return np.concatenate([nothing, *(one.displacement[None] for one in self.solved.frames)])
+        empty = np.zeros((0, *self.model.body.mesh.nodes.shape))
+        return np.concatenate([empty, *(solved.displacement[None] for solved in self.solved.frames)])
 
     @property
     def contact_force(self) -> NDArray[np.float64]:
         """Contact forces on all nodes, friction included [N], shape (F, N, 3)."""
-        nothing = np.zeros((0, *self.model.body.mesh.nodes.shape))
-        return np.concatenate([nothing, *(one.nodal.sum(axis=0)[None] for one in self.solved.frames)])
+        empty = np.zeros((0, *self.model.body.mesh.nodes.shape))
+        return np.concatenate([empty, *(solved.nodal.sum(axis=0)[None] for solved in self.solved.frames)])
 
     @property
     def pressure(self) -> NDArray[np.float64]:
         """Contact pressure at all nodes [Pa], shape (F, N)."""
-        nothing = np.zeros((0, len(self.model.body.mesh.nodes)))
-        return np.concatenate([nothing, *(one.pressure(self.model)[None] for one in self.solved.frames)])
+        empty = np.zeros((0, len(self.model.body.mesh.nodes)))
+        return np.concatenate([empty, *(solved.pressure(self.model)[None] for solved in self.solved.frames)])
 
     def force(self, name: str) -> NDArray[np.float64]:
         """Sum of the contact forces on a body [N], shape (F, 3).
 
         Raises:
-            InputError: No such body.
+            InputError: No deformable body of that name.
         """
         return np.asarray(self.contact_force[:, self._span(name)].sum(axis=1))
 
     def gradient(self, frame: float, parameters: Sequence[Parameter]) -> Gradient:
-        """Derivatives of a frame's equilibrium by joint angles, places, moduli and friction at that frame.
+        """Derivatives of a frame's equilibrium by joint angles, object placements, moduli and friction at that frame.
 
-        The frames before stay as they are, and of a frame that was solved in several load steps its last is
-        differentiated. Exact away from changes of the active set: where a point is about to touch, part, stick or slip,
-        it is one-sided (``warpjld.fem.contact.sensitivity`` has the equations).
+        Earlier frames are held constant; of a frame solved in several load steps the last one is differentiated. The
+        derivative is exact away from changes of the active set; where a point is about to touch, separate, stick or
+        slip, it is one-sided (equations in ``warpjld.fem.contact.sensitivity``).
 
         Args:
             frame: One of ``frames``.
@@ -156,20 +157,21 @@ class Simulation:
             forces and torques of digits.
 
         Raises:
-            InputError: A frame that this run did not solve, or parameters of nothing that is there.
+            InputError: A frame that this run did not solve, or a parameter of a joint, object or pair that is not in
+                the model.
             SensitivityError: The equilibrium has no derivative: a body is free to move.
         """
         known = self.solved.equilibria.get(float(frame))
         if known is None:
-            solved = ", ".join(f"{one:g}" for one in self.solved.equilibria) or "none"
+            solved = ", ".join(f"{number:g}" for number in self.solved.equilibria) or "none"
             raise InputError(f"frame: want one that this run solved ({solved}), got {frame:g}")
         return gradient_at(known.model, known.history, known.solution, parameters)
 
     def visible_pressure(self, name: str, frame: float) -> VisiblePressure:
-        """Pressure on an actor's or object's visible surface at a frame.
+        """Contact pressure on the visible surface of an actor or object at a frame.
 
         Raises:
-            InputError: No such body, or a frame that was not solved.
+            InputError: No deformable body of that name, or a frame outside the solved range.
         """
         self._span(name)
         pressure = self.surfaces.pressure(name, frame)
@@ -181,16 +183,16 @@ class Simulation:
         return VisiblePressure(surface.of(self.surfaces.separated(frame).vertices[name]), surface.faces, pressure)
 
     def tactile(self, actor: str) -> Tactile:
-        """What the pads of an actor feel at the frames that were solved.
+        """Simulated tactile readings of an actor's pads at the solved frames.
 
         Raises:
-            InputError: Its flesh was not solved, or no frame was.
+            InputError: Its flesh was not simulated, or no frame was solved.
         """
         hands = [hand for hand in self.model.hands if hand.name == actor]
         if not hands:
-            raise InputError(f"{actor} has no flesh that feels: FLESH {actor} makes it so")
+            raise InputError(f"{actor} has no simulated flesh to read: FLESH {actor} adds it")
         if not self.solved.frames:
-            raise InputError(f"{actor} feels nothing: {self.solved.message}")
+            raise InputError(f"no tactile readings of {actor}, as no frame was solved: {self.solved.message}")
         return tactile_readings(self.model, hands[0], self.solved.frames)
 
     def _span(self, name: str) -> slice:
@@ -208,24 +210,24 @@ def simulate(
     keeping: Callable[[Keep], None] = lambda keep: None,
     progress: Progress = lambda what, done, total: None,
 ) -> Simulation:
-    """Solve contact over the frames of an animation, and report.
+    """Solve contact over the frames of an animation and evaluate the results.
 
     Args:
-        specification: What is asked; its ``pressing`` says which frames.
-        animation: What moves: of a script, of arrays (``RecordedAnimation``), or anything that implements the protocol.
-            Edits that searches and corrections give are laid over it, and are returned (``solved.edits``).
-        folder: Where the file of ``pressing.state`` is kept.
-        keeping: Told, before the first frame, what keeps the frames that are solved by then, at any time: a function
-            that writes them into the state file, or ``KEPT`` where none is asked for, and returns it; None where there
-            is nothing that a run could go on from.
-        progress: Told about the work.
+        specification: Materials, friction, grips; its ``pressing`` says which frames to solve.
+        animation: Motion of all actors and objects: of a script, of arrays (``RecordedAnimation``), or another
+            implementation of the protocol. Edits by grip searches and corrections are applied to a copy and returned
+            (``solved.edits``).
+        folder: Folder of the state file (``pressing.state``).
+        keeping: Called once before the first frame with a function that may be called at any time: it writes the frames
+            solved so far into the state file (``KEPT`` if none was asked for) and returns its path, or None if there is
+            nothing to resume from.
+        progress: Called with what is being done, how much is done and how much there is.
 
     Returns:
-        All frames that were solved, also where not all could be, or Ctrl-C ended it: see its verdict's status.
+        All frames that were solved, also if some could not be or Ctrl-C ended the run: see the verdict's status.
 
     Raises:
-        InputError: What cannot be: bodies that cannot be meshed or driven, names of nothing; where a script asked for
-            it, with the line.
+        InputError: Bodies that cannot be meshed or driven, or unknown names; with the script line if there is one.
 
     Examples:
         >>> import trimesh
@@ -242,7 +244,7 @@ def simulate(
     """
     request = specification.pressing
     if request is None:
-        raise InputError("specification: want its pressing to say which frames are solved")
+        raise InputError("specification: want pressing set to the frames to solve, got None")
     check_specification(animation, specification, request)
     progress("looking for the first touch", 0, 1)
     specification, animation, before = before_contact(specification, animation, request)
@@ -277,12 +279,12 @@ def simulate(
 def _model(
     specification: ContactSpecification, animation: Animation, before: StartFrame
 ) -> tuple[ContactModel, list[str]]:
-    """All bodies at the start, and notes on them."""
+    """Contact model of all bodies at the start frame, and notes on them."""
     notes, hands, start = before.notes(), [], before.start
     for name, material in specification.flesh.items():
-        hand, said = build_flesh_body(animation.actors[name], material, start)
+        hand, remarks = build_flesh_body(animation.actors[name], material, start)
         hands.append(hand)
-        notes += said
+        notes += remarks
     objects = [
         build_object_body(animation.objects[name], specification, start, before.place(name))
         for name in specification.physical
@@ -301,7 +303,7 @@ def _model(
 
 
 def _frames(specification: ContactSpecification, request: SolveSpecification, start: float) -> list[float]:
-    """Frames to solve: every so many, the last, and those at which a grip begins or ends."""
+    """Frames to solve, ascending: every ``request.every``-th, the last, and those at which a grip begins or ends."""
     frames = {float(f) for f in range(request.first, request.last + 1, request.every)} | {float(request.last)}
     for grip in specification.grips:
         frames |= {grip.first, grip.middle, grip.last}
@@ -311,7 +313,7 @@ def _frames(specification: ContactSpecification, request: SolveSpecification, st
 def _report(
     solved: SolveResult, before: StartFrame, table: ContactTable, request: SolveSpecification, notes: list[str]
 ) -> Simulation:
-    """All that is told of solved frames."""
+    """Surfaces, table, verdict and notes of the solved frames."""
     model, animation = solved.model, solved.model.animation
     assert animation is not None
     surfaces = DeformedSurfaces(

@@ -1,4 +1,4 @@
-"""Frames solved one after another, each kept as soon as it is done (R99, R110, R118, R120, R123)."""
+"""Sequential solution of the frames, with a checkpoint after each (R99, R110, R118, R120, R123)."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from warpjld.simulation.specification import ContactSpecification, GripSpecifica
 __all__ = ["Progress", "Save", "solve_frames"]
 
 Progress = Callable[[str, int, int], None]
-"""Told what is being done, how much of it is done, and how much there is."""
-
+"""Called with what is being done, how much of it is done, and how much there is."""
 
 Watch = Callable[[ContactModel, SolvedFrame], str | None]
+"""Called with the model and each frame after it is solved; a returned text stops the run (R118)."""
 
 Save = Callable[[CheckpointFile], bool]
-"""Saves what is solved so far; False where there is nothing to go on from."""
+"""Saves the frames solved so far; returns False if there is nothing to resume from."""
 
 
 def solve_frames(
@@ -51,20 +51,21 @@ def solve_frames(
     saving: Callable[[Save], None] = lambda save: None,
     progress: Progress = lambda what, done, total: None,
 ) -> SolveResult:
-    """Solve contact at frames; Ctrl-C ends it with those that were solved, if any were.
+    """Solve contact at the given frames; Ctrl-C ends the run with the frames solved so far, if there are any.
 
     Args:
-        model: What may touch, at rest at its start: before anything touches, or where overlaps begin to part (R112).
-        frames: Rising, after that start.
-        contact: What is asked of contact: grips to find, and how strong muscles are.
-        request: How to solve.
-        watch: Told the model and each frame as it is solved; a text stops the run there (R118).
-        checkpoint: Holds what was solved so far; an earlier run's is gone on from.
-        saving: Told before the first frame what saves, at any time, the frames that are solved by then.
-        progress: Told about the work.
+        model: Bodies and contact pairs, at rest at the model's start: before any contact, or with initial overlaps that
+            are removed gradually (R112).
+        frames: Frame numbers after that start, ascending.
+        contact: Grips to find and strength of the muscles.
+        request: Solution method and options.
+        watch: Called after each solved frame; a returned text stops the run (R118).
+        checkpoint: File of the solved frames; a state left by an earlier run is resumed.
+        saving: Called once before the first frame with a function that saves the frames solved so far, at any time.
+        progress: Called with what is being done.
 
     Raises:
-        InputError: A state that belongs to something else.
+        InputError: The state file belongs to another simulation.
     """
     run = _Run(model, contact, request)
     saving(run.save)
@@ -84,7 +85,7 @@ def solve_frames(
 
 
 def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progress: Progress) -> SolveResult:
-    """Frames of bodies with nothing to touch."""
+    """Solve the frames of bodies without any contact pair."""
     done: list[SolvedFrame] = []
     try:
         status, message = solve_untouched(model, frames, done, watch, progress)
@@ -99,7 +100,7 @@ def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progr
 def _solve_on(
     run: _Run, frames: Sequence[float], watch: Watch, checkpoint: CheckpointFile | None, progress: Progress
 ) -> SolveResult:
-    """Solve the frames that are not done yet."""
+    """Solve the remaining frames."""
     contact = run.contact
     for frame in frames[len(run.done) :]:
         progress(f"contact, frame {frame:g}", len(run.done), len(frames))
@@ -122,7 +123,7 @@ def _solve_on(
 
 @dataclass(eq=False)
 class _Run:
-    """What is known so far of frames that are being solved."""
+    """Mutable state of a run over frames: current model, history and everything found so far."""
 
     model: ContactModel
     contact: ContactSpecification
@@ -143,13 +144,14 @@ class _Run:
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
         self.clearance = BoneClearance(self.model)
-        asked = any(grip.force is not None for grip in self.contact.grips)  # for a force, whatever opposes it
-        held = [] if asked else [name for name in self.model.obstacles if name in self.contact.grasped]
+        # a search for a prescribed force is not limited by what the held objects can oppose
+        by_force = any(grip.force is not None for grip in self.contact.grips)
+        held = [] if by_force else [name for name in self.model.obstacles if name in self.contact.grasped]
         weights = {name: weight_of(self.model.obstacles[name]) for name in held}
         self.limits = ForceLimits(self.contact.strength, self.request.pressure, weights, self.clearance)
 
     def resume(self, found: Checkpoint, watch: Watch) -> list[str]:
-        """Go on from what another run left, with the model of each frame as it was then; what ``watch`` says."""
+        """Restore a checkpoint, replaying its edits frame by frame; returns the texts that ``watch`` gave."""
         self.last, self.resumed, self.missed = found.solution, len(found.frames), list(found.missed)
         self.limits.restore(found.limits)
         self.tight = {(one.actor, one.digit, one.object): (frame, one) for frame, one in found.tight}
@@ -166,13 +168,13 @@ class _Run:
         return reasons
 
     def _add(self, solved: SolvedFrame) -> None:
-        """Note a frame that is solved, and how many edits there were by then."""
+        """Append a solved frame, with the number of edits made up to it."""
         self.done.append(solved)
         self.edited.append(len(self.edits))
         self._note(solved)
 
     def solve(self, frame: float) -> SolveResult | None:
-        """Add a frame; what ended all where it cannot be solved."""
+        """Solve and append a frame; returns the final result if the frame cannot be solved."""
         model, time, before = self.model, frame - self.model.start, self.last
         now = np.zeros_like(model.body.mesh.nodes) if before is None else before.last.displacement
         steps = self.substeps.times(model, 0.0 if before is None else before.last.time, time, now)
@@ -211,19 +213,19 @@ class _Run:
         self.missed += missed_contacts(model, self.done[-1] if self.done else None, solution.instants)
         self.last = solution
         self._add(solved_frame(float(frame), solution.instants))
-        if all(grip.first != frame for grip in self.contact.grips):  # else when the grip is found
+        if all(grip.first != frame for grip in self.contact.grips):  # otherwise after the grip search
             self._settle()
         return None
 
     def save(self, checkpoint: CheckpointFile) -> bool:
-        """Save all frames that are solved; False where none is, or corrections would be lost."""
+        """Save the solved frames; returns False if there are none, or with corrections, which are not saved."""
         if self.settled is None or self.request.correct:
             return False
         checkpoint.save(self.settled[1])
         return True
 
     def interrupted(self) -> SolveResult:
-        """All of it as it was after the last frame that was solved."""
+        """Result as of the last completely solved frame."""
         if self.settled is not None:
             self.model, known = self.settled
             self.done, self.edits, self.missed = list(known.frames), list(known.edits), list(known.missed)
@@ -232,7 +234,7 @@ class _Run:
         return replace(self.ended(SolveStatus.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
 
     def _settle(self) -> None:
-        """Remember how things are between two frames: an interrupt falls anywhere within one."""
+        """Take a consistent snapshot between two frames, since an interrupt may come at any time within one."""
         assert self.last is not None
         tight, limits = tuple(self.tight.values()), self.limits.content()
         parts = (tuple(self.edits), limits, tuple(self.missed), tight, tuple(map(grip_content, self.grips)))
@@ -240,28 +242,28 @@ class _Run:
         self.settled = self.model, known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
-        """A bone that lies in an object at one of some times, in words: no force can part them."""
+        """Message about a bone inside an object at one of the times; None if there is none."""
         found = (self.clearance.inside(model, time) for time in times)
         return next(filter(None, found), None)
 
     def _note_bones(self, model: ContactModel, frame: float) -> None:
-        """Remember what bones are near to objects."""
+        """Record the smallest clearance between bones and objects."""
         for one in self.clearance.nearest(model, frame - model.start):
             place = (one.actor, one.digit, one.object)
             if one.left < TIGHT and (place not in self.tight or one.left < self.tight[place][1].left):
                 self.tight[place] = (frame, one)
 
     def find(self, grip: GripSpecification, progress: Progress, total: int) -> FoundGrip:
-        """Look for a grip, and go on with it; ``progress`` hears of every grip that is tried."""
+        """Search for a grip and apply its edits; ``progress`` is called for every trial grip."""
         what = f"looking for a grip, frame {grip.first:g}"
         progress(what, len(self.done), total)
         assert self.last is not None
         limits = self.contact.strength.get(grip.actor, {})
 
-        def tell(line: str) -> None:
+        def report(line: str) -> None:
             progress(f"{what}: {line}", len(self.done), total)
 
-        found = find_grip(self.model, self.history, grip, self.last, limits, tell)
+        found = find_grip(self.model, self.history, grip, self.last, limits, report)
         self.grips.append(found)
         self._edit(found.edits)
         self._release(found)
@@ -270,13 +272,13 @@ class _Run:
         return found
 
     def _release(self, found: FoundGrip) -> None:
-        """Let the support go as a grip has it."""
+        """Release the objects' supports as the grip prescribes."""
         if found.release is not None:
             objects = [found.release.applied(one) for one in self.model.objects]
             self.model = replace(self.model, objects=tuple(objects))
 
     def ended(self, status: SolveStatus, message: str) -> SolveResult:
-        """All of it."""
+        """Final result of the run with a status."""
         return SolveResult(
             status,
             message,

@@ -1,4 +1,4 @@
-"""Frames that were solved, and all that is known of them."""
+"""Result of solving frames: equilibria, edits, grips and corrections."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ __all__ = ["KnownEquilibrium", "SolveResult"]
 
 @dataclass(frozen=True, eq=False)
 class KnownEquilibrium:
-    """A frame's equilibrium, and what it belongs to.
+    """A frame's equilibrium with the model and history it was solved for, as needed to differentiate it.
 
     Attributes:
-        model: Everything, with the edits that held there.
-        history: What was known before it.
-        solution: Its last instant, without what touches.
+        model: The contact model with the edits valid at that frame.
+        history: History before the frame.
+        solution: The last load step, without its ``touches``.
     """
 
     model: ContactModel
@@ -37,23 +37,23 @@ class KnownEquilibrium:
 
 @dataclass(frozen=True, eq=False)
 class SolveResult:
-    """Frames that were solved, and how it ended.
+    """Solved frames and how the run ended.
 
     Attributes:
-        status: Of the last load step.
-        message: For people.
-        model: What was solved, with all edits.
-        frames: In order.
-        resumed: How many of them an earlier run left.
-        missed: Touches between frames that no frame shows.
-        edits: Angles that searches and corrections gave, in order.
-        grips: What came of searches for a grip.
-        corrections: What came of corrections.
-        stops: Digits that closed no farther.
-        tight: Bones that came nearest to objects, of every digit and object the nearest.
-        equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
-        released: Frame after which what nothing holds any more falls, if it does: contact is not solved from there on.
-        interrupted: Whether Ctrl-C ended it.
+        status: Status of the last load step.
+        message: Explanation of the status in words.
+        model: The contact model with all edits.
+        frames: Solved frames in order.
+        resumed: Number of frames taken from the state of an earlier run.
+        missed: Contacts between two frames that neither of the frames shows.
+        edits: Joint flexions set by grip searches, corrections and force limits, in order.
+        grips: Results of the grip searches.
+        corrections: Results of the corrections of frames.
+        stops: Digits that stopped at their force limit.
+        tight: Frame and smallest clearance between bone and object, by actor, digit and object.
+        equilibria: Equilibrium of each frame that this run solved, by frame number, for differentiation.
+        released: Frame from which on unheld objects fall and contact is no longer solved; None if there is none.
+        interrupted: Whether Ctrl-C ended the run.
     """
 
     status: SolveStatus

@@ -1,6 +1,6 @@
-"""What is asked of a simulation of contact: materials, friction, grips to find and frames to solve, as plain records.
+"""Specification of a contact simulation: materials, friction, grips to find and frames to solve, as plain records.
 
-Whoever fills them, commands of a script or a program in Python, says where each was asked for, so that messages can.
+Records that stem from a script carry the location of their command (``where``), which error messages then name.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ __all__ = [
 ]
 
 _FRICTION = 0.6
-"""Skin on aluminium (Seo 2009)."""
+"""Default Coulomb coefficient: skin on aluminium (Seo 2009)."""
 _EARTH = 9.81
-"""[m/s²]"""
+"""Gravitational acceleration [m/s²]."""
 
 
 @dataclass(frozen=True)
 class FleshMaterial:
-    """An actor whose flesh deforms (R105).
+    """Deformable flesh of an actor (R105).
 
     Attributes:
-        digits: Those whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand. With the thumb comes
-            its ball.
+        digits: Digits whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand. The thumb includes
+            its ball (thenar).
         element: Edge length of the elements [m].
-        flesh: Young's modulus of what lies between skin and bone [Pa].
-        skin: Young's modulus of the outermost layer of elements [Pa].
+        flesh: Young's modulus of the tissue between skin and bone [Pa]; default: subcutaneous tissue (Maeno 1998).
+        skin: Young's modulus of the outermost layer of elements [Pa]; default: dermis (Maeno 1998).
         poisson: Poisson's ratio of both.
         stiffening: Exponent of Fung's law; 0 is neo-Hookean.
-        itself: Whether the skin may touch itself (R126).
-        where: Place in a script, for messages.
+        itself: Whether self-contact of the skin is considered (R126).
+        where: Script location, for messages.
 
     Examples:
         >>> wj.FleshMaterial(digits=("index",), element=0.003).flesh  # Pa
@@ -76,12 +76,12 @@ class FleshMaterial:
 
 @dataclass(frozen=True)
 class BondStrength:
-    """Two objects that are one until the traction between them is too much (R101, R102).
+    """Two objects tied together until the traction between them exceeds a strength (R101, R102).
 
     Attributes:
-        one, other: Objects.
-        normal, shear: Strength [Pa].
-        where: Place in a script, for messages.
+        one, other: Names of the objects.
+        normal, shear: Tensile and shear strength of the bond [Pa].
+        where: Script location, for messages.
     """
 
     one: str
@@ -93,20 +93,20 @@ class BondStrength:
 
 @dataclass(frozen=True)
 class GripSpecification:
-    """A grip that is to be found: the gentlest that holds an object's weight, or the one that presses with a force.
+    """A grip to search for: the smallest closing that holds an object's weight, or the one that gives a total force.
 
     Attributes:
-        actor: Whose hand closes.
-        object: What it holds; a force needs none.
-        first, last: Frames between which it closes; where it lifts, it closes up to half-way and has the weight at the
-            last.
+        actor: Actor whose hand closes.
+        object: Object to hold; not needed with ``force``.
+        first, last: Frames between which the hand closes; when lifting, it closes until ``middle`` and bears the whole
+            weight at ``last``.
         channels: Flexions that close, as ``left.index.base.flexion``.
-        most: Angle by which each may close at most [rad].
-        lift: Whether it is to hold the object.
-        weight: Of the object [N]; None: as its density has it.
-        force: Wished sum of the forces of the digits [N].
-        digits: Those whose forces count, as ``index``; none for all that close.
-        where: Place in a script, for messages.
+        most: Largest angle by which each may close [rad].
+        lift: Whether the grip has to hold the object.
+        weight: Weight of the object [N]; None: from its density.
+        force: Target for the sum of the digits' forces [N].
+        digits: Digits whose forces count, as ``index``; empty for all that close.
+        where: Script location, for messages.
 
     Examples:
         >>> closing = ("left.index.base.flexion", "left.thumb.base.flexion")
@@ -129,28 +129,30 @@ class GripSpecification:
 
     @property
     def middle(self) -> float:
-        """Frame at which the hand has closed."""
+        """Frame at which the hand is closed."""
         return round(0.5 * (self.first + self.last)) if self.lift else self.last
 
 
 @dataclass(frozen=True)
 class SolveSpecification:
-    """Frames to solve contact at.
+    """Frames at which contact is solved, and how.
 
     Attributes:
-        first, last: Both included; solving begins with the last of them before anything touches.
-        every: Frames between two that are solved; those between are interpolated.
-        method: The default, or the paper's loop (R113).
-        aitken: Relaxation of the paper's loop.
-        stop: Whether to stop where the muscles can do no more (R118).
-        correct: Whether to open digits that bear more than their muscles can (R120).
-        rigid: Whether digits close as the animation has it, however hard they then press. Otherwise, and unless it
-            stops or corrects, a digit closes no farther than its muscles can press or its skin bears.
-        pressure: What skin bears [Pa]. By default what leaves half of a fingertip's flesh between bone and wall: beyond
-            it forces double every tenth of a millimetre, and laws of flesh were never measured.
-        state: File the state is kept in, so that a stopped run goes on; None keeps none.
-        rate: Frames a second: how long what falls takes.
-        where: Place in a script, for messages.
+        first, last: Range of frames, both included; solving begins at the last frame before any contact.
+        every: Step between solved frames; frames between are interpolated.
+        method: ``augmented``: augmented Lagrangian method; ``paper``: the paper's staggered loop (R113).
+        aitken: Whether the paper's loop uses Aitken relaxation.
+        stop: Whether to stop at the first frame in which the muscles' strength is exceeded (R118).
+        correct: Whether to open digits that bear more than their muscles' strength (R120).
+        rigid: Whether digits follow the animation whatever force results. Otherwise, and unless ``stop`` or
+            ``correct`` is set, a digit stops closing at the force limit of its muscles or the pressure limit of its
+            skin.
+        pressure: Largest contact pressure that skin bears [Pa]. The default leaves half of a fingertip's flesh between
+            bone and wall: beyond it forces double every tenth of a millimetre, outside the range in which laws of flesh
+            were measured.
+        state: File of the state from which a stopped run resumes; None: no file.
+        rate: Frames per second, for the duration of falls.
+        where: Script location, for messages.
 
     Examples:
         >>> wj.SolveSpecification(0, 8, every=2).method
@@ -179,13 +181,13 @@ class SolveSpecification:
 
     @property
     def limited(self) -> bool:
-        """Whether digits stop where they can press no harder."""
+        """Whether digits stop closing at their force limits."""
         return not (self.rigid or self.stop or self.correct or self.method == "paper")
 
 
 @dataclass(eq=False)
 class ContactSpecification:
-    """Everything that is asked of contact.
+    """Complete specification of a contact simulation.
 
     Examples:
         >>> contact = wj.ContactSpecification(
@@ -195,21 +197,21 @@ class ContactSpecification:
         0.6
 
     Attributes:
-        physical: Objects that deform, by name.
-        flesh: Actors whose flesh deforms, by name.
-        points: Named points by object and name.
-        prescribed: State variables by object and points.
-        loads: Forces on objects, by object, points and kind.
-        spins: Objects that turn steadily, by name.
-        bonds: Objects that stick together.
-        friction: Coefficients by pair of names, in alphabetical order.
-        everywhere: Coefficient of all other pairs; None: that of their materials, of skin where it is not known, or
-            none with the paper's loop, which knows none.
-        gravity: [m/s²].
-        strength: Largest force of digits [N], by actor and digit, where it is not the default.
+        physical: Deformable objects by name.
+        flesh: Actors with deformable flesh by name.
+        points: Named point sets by object and name.
+        prescribed: Prescribed state variables by object and point set.
+        loads: External loads by object, point set and kind.
+        spins: Steadily rotating objects by name.
+        bonds: Tied pairs of objects.
+        friction: Coulomb coefficients by pair of names, in alphabetical order.
+        everywhere: Coefficient of all other pairs; None: that of their materials, else the default for skin, and 0 with
+            the paper's loop, which has no friction.
+        gravity: Gravitational acceleration [m/s²].
+        strength: Force limits of digits that differ from the default [N], by actor and digit.
         grips: Grips to find, in the order of their frames.
-        pressing: What to solve, if anything.
-        grasped: Objects that digits have closed on: hands alone are to hold them.
+        pressing: Frames to solve; None: nothing.
+        grasped: Objects that digits have closed on, which only hands hold.
     """
 
     physical: dict[str, ObjectMaterial] = field(default_factory=dict)
@@ -228,10 +230,10 @@ class ContactSpecification:
     grasped: tuple[str, ...] = ()
 
     def check(self) -> None:
-        """Refuse numbers that are none.
+        """Validate friction coefficients, gravity and strengths.
 
         Raises:
-            InputError: Names the field.
+            InputError: A number is out of range; names the field.
         """
         for coefficient in (*self.friction.values(), *(() if self.everywhere is None else (self.everywhere,))):
             _want(0.0 <= coefficient < np.inf, "friction", "coefficients of 0 or more", coefficient)
@@ -243,34 +245,34 @@ class ContactSpecification:
 
     @property
     def pull(self) -> tuple[float, float, float]:
-        """Acceleration [m/s²]: as asked, and that of the earth, downwards, where something is lifted without a word."""
+        """Acceleration [m/s²]: ``gravity``, or the earth's along -y if it is zero and a grip lifts an object."""
         lifts = any(grip.lift for grip in self.grips)
         return (0.0, -_EARTH, 0.0) if lifts and not any(self.gravity) else self.gravity
 
     @property
     def loaded(self) -> set[str]:
-        """Objects that forces act on."""
+        """Names of objects with external loads."""
         return {name for name, _, _ in self.loads} | set(self.spins)
 
     def lifted(self, name: str) -> GripSpecification | None:
-        """The grip that is to hold an object, if any."""
+        """The grip that lifts an object; None if there is none."""
         return next((grip for grip in self.grips if grip.lift and grip.object == name), None)
 
     def coefficient(self, one: str, other: str) -> float:
-        """Friction between two."""
+        """Coulomb coefficient between two bodies by name."""
         paper = self.pressing is not None and self.pressing.method == "paper"
         known = pair_friction(self._matter(one), self._matter(other))
         usual = 0.0 if paper else _FRICTION if known is None else known
         return self.friction.get(name_pair(one, other), usual if self.everywhere is None else self.everywhere)
 
     def _matter(self, name: str) -> str | None:
-        """What a body is made of, where that is known."""
+        """Catalogue name of a body's material; None if it is not known."""
         if name in self.flesh:
             return "skin"
         return self.physical[name].made_of if name in self.physical else None
 
     def bond(self, one: str, other: str) -> BondStrength | None:
-        """The bond between two objects, if any."""
+        """The bond between two objects; None if there is none."""
         for bonded in self.bonds:
             if name_pair(bonded.one, bonded.other) == name_pair(one, other):
                 return bonded
@@ -278,10 +280,10 @@ class ContactSpecification:
 
 
 def _want(holds: bool, name: str, what: str, got: object) -> None:
-    """Raise where an argument is none.
+    """Check an argument.
 
     Raises:
-        InputError: Names it.
+        InputError: The condition does not hold; names the argument.
     """
     if not holds:
         raise InputError(f"{name}: want {what}, got {got}")
@@ -293,7 +295,7 @@ def name_pair(one: str, other: str) -> tuple[str, str]:
 
 
 def located(error: InputError, where: SourceLocation | None) -> InputError:
-    """The same error at a place in a script, unless it has one."""
+    """The error with a script location added, unless it has one already."""
     if where is None or error.line is not None:
         return error
     path, line, column = where

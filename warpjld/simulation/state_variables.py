@@ -1,4 +1,4 @@
-"""What a script prescribes of objects over keys: displacements of their points, and formulas (R94, R128)."""
+"""Keyed state variables of objects: prescribed displacements of point sets, and Barr deformations (R94, R128)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ __all__ = ["BarrKeys", "Points", "PrescribedPoints"]
 
 @dataclass(frozen=True)
 class Points:
-    """Points of a deformable object (R128).
+    """Rule that selects points of a deformable object (R128).
 
     Attributes:
-        kind: ``all``, the ``upper`` or ``lower`` end along an axis, or those ``near`` a place.
-        axis: 0, 1 or 2, of the object's own frame.
-        share: Of its extent along the axis.
-        centre: Of a ball on the stage, where the object is at first [m].
-        radius: Its radius [m].
+        kind: ``all`` points, the ``upper`` or ``lower`` end along an axis, or those ``near`` a position.
+        axis: 0, 1 or 2 of the object's own frame, for ``upper`` and ``lower``.
+        share: Fraction of the object's extent along the axis that counts as its end.
+        centre: Centre of the ball for ``near``, in world coordinates of the initial placement [m].
+        radius: Radius of that ball [m].
     """
 
     kind: Literal["all", "upper", "lower", "near"] = "all"
@@ -35,10 +35,10 @@ class Points:
     radius: float = 0.0
 
     def choose(self, local: NDArray[np.float64], stage: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Numbers of the points that are meant, of positions in the object's frame and on the stage (n, 3) [m].
+        """Indices of the selected points, given positions in the object's frame and in world coordinates (n, 3) [m].
 
         Raises:
-            InputError: None is.
+            InputError: No point is selected.
         """
         if self.kind == "all":
             return np.arange(len(local))
@@ -47,7 +47,7 @@ class Points:
         else:
             x = local[:, self.axis]
             low, high = float(x.min()), float(x.max())
-            reach = (self.share + 1e-9) * (high - low)
+            reach = (self.share + 1e-9) * (high - low)  # tolerance for rounding, so that share 0 selects the end face
             chosen = x >= high - reach if self.kind == "upper" else x <= low + reach
         if not chosen.any():
             raise InputError("no point of the object lies there")
@@ -56,13 +56,13 @@ class Points:
 
 @dataclass(eq=False)
 class PrescribedPoints:
-    """A state variable: displacements of object points from where they are at first, over keys (R128).
+    """A state variable: keyed displacements of object points from their initial positions (R128).
 
     Attributes:
-        points: Which.
-        tracks: Keys of the prescribed axes ``x``, ``y``, ``z`` [m]: three of them (VECTOR) or fewer.
-        held: Whether the points go where the object's place goes; ``tracks`` then displace them from there.
-        until: Frame after which points that are held are free.
+        points: Which points.
+        tracks: Keys of the prescribed axes ``x``, ``y``, ``z`` [m]: all three (VECTOR) or fewer.
+        held: Whether the points follow the object's placement; ``tracks`` then add to it.
+        until: Last frame at which held points follow it; afterwards they are free.
     """
 
     points: Points
@@ -71,23 +71,23 @@ class PrescribedPoints:
     until: float = float("inf")
 
     def holds(self, frame: float) -> bool:
-        """Whether the points go with the object at a frame."""
+        """Whether the points follow the object's placement at a frame."""
         return self.held and frame <= self.until
 
 
 @dataclass(eq=False)
 class BarrKeys:
-    """Barr's deformations of an object, over keys (R94).
+    """Keyed global deformations of an object by Barr (1984) (R94).
 
     Attributes:
-        axis: ``x``, ``y`` or ``z``.
-        tracks: Keys of ``taper`` (share), ``twist`` and ``bend`` [rad].
+        axis: ``x``, ``y`` or ``z`` of the object.
+        tracks: Keys of ``taper`` (fraction), ``twist`` and ``bend`` [rad].
     """
 
     axis: Literal["x", "y", "z"]
     tracks: dict[str, Track] = field(default_factory=dict)
 
     def at(self, kind: str, frame: float) -> float:
-        """The amount at a frame."""
+        """Amount of one kind of deformation at a frame; 0 without keys."""
         track = self.tracks.get(kind)
         return 0.0 if track is None else float(track.spline(frame))

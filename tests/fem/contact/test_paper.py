@@ -142,7 +142,7 @@ def test_what_it_cannot_do_is_refused():
     with pytest.raises(InputError, match="neither friction nor bonds"):
         press(body, fixed, [Pair("upper.z-", "lower.z+", friction=0.5)], method="paper")
     faces, never = np.zeros(9, np.int32), np.zeros((1, 1), bool)
-    with pytest.raises(InputError, match="does not know a surface that meets itself"):
+    with pytest.raises(InputError, match="supports no self-contact"):
         press(body, fixed, [Pair("upper.z-", "lower.z+", exclusion=Exclusion(faces, faces, never))], method="paper")
     with pytest.raises(InputError, match="want augmented or paper"):
         press(body, fixed, [Pair("upper.z-", "lower.z+")], method="papers")

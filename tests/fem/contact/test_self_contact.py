@@ -86,7 +86,7 @@ def test_what_is_excluded_passes(strip: Body) -> None:
 
 def test_self_contact_without_parts_is_refused(strip: Body) -> None:
     faces, _ = upper(strip, never=False)
-    with pytest.raises(InputError, match="against itself wants an exclusion"):
+    with pytest.raises(InputError, match="self-contact needs an exclusion"):
         press(strip, folded(strip, 0.1), [Pair(faces, faces)])
 
 

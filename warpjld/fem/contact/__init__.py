@@ -1,4 +1,4 @@
-"""Bodies in contact: with one another, with themselves and with obstacles; friction; bonds (B §3.4, R108–R130)."""
+"""Contact of deformable bodies with each other, themselves and obstacles; friction, bonds (B §3.4, R108–R130)."""
 
 from warpjld.fem.contact.interface.pairs import Bond, Exclusion, Pair
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle

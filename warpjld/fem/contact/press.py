@@ -1,4 +1,4 @@
-"""Bodies pressed against each other and against obstacles, through time (B §3.4, R108–R113, R122, R126)."""
+"""Quasi-static contact problems over time: entry point of the contact solvers (B §3.4, R108–R113, R122, R126)."""
 
 from __future__ import annotations
 
@@ -40,31 +40,34 @@ def press(
     check: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
-    """Equilibria of bodies in contact at rising times.
+    """Equilibria of bodies in contact at ascending times.
 
-    Surfaces that overlap at the start are parted gradually up to the first time (R112). Steps that fail are halved;
-    those longer than contact can follow, and those in which friction first takes hold, are cut. Bodies that would pass
-    through each other, or lie deep in one another with nothing to part them, end the run with ``Status.PASSED``.
+    Initial overlaps are removed gradually up to the first time (R112). Load steps that fail are halved; steps longer
+    than contact search can follow, and steps in which frictional contact begins, are cut. Bodies that would pass
+    through each other, or lie deep inside each other without contact, end the run with ``SolveStatus.PASSED``.
 
     Args:
         body: All bodies, merged into one mesh.
-        prescribed: Known displacements from rest at the last time, reached in proportion to it; or a function of time.
-        pairs: What may touch what.
-        loads: Loads at the last time, reached in proportion to time; or a function of time.
-        times: Rising times above 0 (above ``after``'s) to find equilibria at.
-        after: Contact and displacement to go on from.
-        method: ``augmented`` (Lagrangian, on bodies and contact together), or ``paper``: objects repelled by the skin
-            and released, in turns (R113; ``contact.paper.loop`` says when it settles). The slave is repelled.
-        aitken: Relax the paper's loop.
-        tolerance, penetration: Residual over the forces that balance; overlap left, as a share of an edge.
-        guess: Where to begin to look.
-        watch: Asked after each instant; a text ends the run there with ``Status.STOPPED`` (R118).
-        halvings: How often a step that fails may be halved, and its halves again; by default as long as it may help.
-        check: Raise where the last time is not reached; otherwise return the status.
+        prescribed: Dirichlet conditions at the last time, applied in proportion to time; or a function of time.
+        pairs: Contact pairs.
+        loads: Loads at the last time, applied in proportion to time; or a function of time.
+        times: Ascending times, above 0 (or above the last of ``after``), at which equilibria are returned.
+        after: Solution to continue from.
+        method: ``augmented``: augmented Lagrangian method, bodies and contact solved together
+            (``contact.solver``); ``paper``: the paper's staggered loop, in which slave nodes are repelled by the master
+            and both are released (R113; ``contact.paper.loop`` tells when it converges).
+        aitken: Whether the paper's loop uses Aitken relaxation.
+        tolerance: Residual relative to the forces in balance.
+        penetration: Admissible penetration, relative to an element edge.
+        guess: Predictor of the displacement.
+        watch: Called after each instant; a returned text ends the run with ``SolveStatus.STOPPED`` (R118).
+        halvings: Most successive halvings of a failing load step; by default 7, or 3 for an unheld body.
+        check: Whether to raise if the last time is not reached, instead of returning the status.
         progress: Called with a line of text after each instant.
 
     Raises:
-        InputError, ContactError: Wrong arguments; the last time not reached (``solution`` has what was).
+        InputError: Wrong arguments.
+        ContactError: The last time was not reached; its ``solution`` holds the instants found.
     """
     wanted = _rising(times, 0.0 if after is None else after.last.time)
     for name, value in (("tolerance", tolerance), ("penetration", penetration)):
@@ -79,8 +82,8 @@ def press(
     if method == "paper":
         solution = by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, guess, watch, progress)
     else:
-        way = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
-        solution = way.run(watch, progress)
+        steps = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
+        solution = steps.run(watch, progress)
     warn_of_rotation(body, solution.last.displacement)
     if check and not solution.converged and solution.status is not SolveStatus.STOPPED:
         raise ContactError(solution)
@@ -88,6 +91,11 @@ def press(
 
 
 def _rising(times: Sequence[float], first: float) -> list[float]:
+    """Times as floats.
+
+    Raises:
+        InputError: Times that are not finite, not ascending or not above ``first``.
+    """
     wanted = [float(t) for t in times]
     rising = all(a < b for a, b in zip([first, *wanted], wanted, strict=False))
     if not wanted or not np.isfinite(wanted).all() or not rising:

@@ -13,7 +13,9 @@ from warpjld.skeleton.hand import DIGITS
 __all__ = ["WEB", "excluded_pairs", "fringes", "joined_pairs", "segment_name", "skin_labels"]
 
 _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": "palm", "carpometacarpal": "wrist"}
+"""Segment that ends at a finger's joint."""
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
+"""Segment that ends at a thumb's joint."""
 _BETWEEN = "middle"
 """Phalanx between a finger's first and last; a thumb has none."""
 WEB = ".web"

@@ -74,11 +74,6 @@ class DigitEffort:
         return ("force", *JOINT_WORDS)[int(self.shares.argmax())]
 
     @property
-    def levers(self) -> NDArray[np.float64]:
-        """Lever arm of each joint, torque per force [m], shape (3,)."""
-        return self.torques / max(self.force, 1e-12)
-
-    @property
     def text(self) -> str:
         """``index 41 N of 59 N``, with the joint of the largest share if that is above 1 and exceeds the force's."""
         out = f"{self.digit} {self.force:.3g} N of {self.limit:.3g} N"

@@ -18,6 +18,7 @@ from warpjld.fem.mesh.shape import POINTS, shape_at, slope_at
 __all__ = ["Centrifugal", "Loads", "external_forces", "subtract_pressure_stiffness", "volumes"]
 
 _QUAD = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+"""Reference coordinates of a quadrilateral's corners."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ __all__ = ["Fung", "LinearElastic", "Material", "MaterialWarning", "MooneyRivlin
 
 _USUAL_POISSON = 0.49  # larger values cause a warning
 LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN, FUNG, NEO_HOOKE_FULL = range(6)
+"""Numbers of the laws, as in ``warpjld_kernels.fem_laws``."""
 
 
 class MaterialWarning(UserWarning):

@@ -231,3 +231,4 @@ class _Hull:
 
 
 _GAUSS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))
+"""Points of 3-point Gauss quadrature on [0, 1]."""

@@ -89,7 +89,9 @@ def _nonmanifold_patterns() -> Mask:
 
 _NONMANIFOLD = _nonmanifold_patterns()
 _BITS = 1 << np.arange(8)
+"""Value of each of the eight cells around a node in the number of a pattern."""
 _FLIPS = np.array([[bool(n >> bit & 1) for bit in range(8)] for n in range(1, 256)])
+"""All sets of cells that can be changed."""
 
 
 _MARGIN = 0.1

@@ -13,7 +13,7 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.mesh.core import core_of
 from warpjld.fem.mesh.envelope import Envelope
-from warpjld.fem.mesh.hexmesh import HexMesh, elements_of
+from warpjld.fem.mesh.hexmesh import HexMesh, elements_of, nodal_area_vectors
 from warpjld.fem.mesh.untangle import improve
 from warpjld.geometry.rotations import unit
 
@@ -120,10 +120,7 @@ def _with_boundary_layer(cells: Mask, origin: Array, spacing: float, name: str) 
     skin = np.unique(quads)
     outer = np.full(len(nodes), -1, np.int32)
     outer[skin] = len(nodes) + np.arange(len(skin), dtype=np.int32)
-    x = nodes[quads]
-    normal = np.zeros_like(nodes)
-    np.add.at(normal, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
-    outwards = unit(normal[skin])
+    outwards = unit(nodal_area_vectors(nodes, quads)[skin])
     layer = np.concatenate([quads, outer[quads]], axis=1)
     all_elements = np.concatenate([elements, layer]).astype(np.int32)
     faces = np.stack([len(elements) + np.arange(len(layer)), np.full(len(layer), 5)], axis=1).astype(np.int32)
@@ -160,9 +157,7 @@ def _fit_boundary(
     nearest = np.inf
     for number in range(rounds + _REPAIRS + _RETURNS):
         answer = envelope.ask(nodes[boundary])
-        x = nodes[quads]
-        outwards = np.zeros_like(nodes)
-        np.add.at(outwards, quads, np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])[:, None, :].repeat(4, axis=1))
+        outwards = nodal_area_vectors(nodes, quads)
         agrees = np.einsum("bi,bi->b", outwards[boundary], answer.normal) > 0.0
         target, normal = _follow_neighbours(nodes[boundary], answer.closest, answer.normal, agrees, links)
         strength = (2.0, 10.0, 30.0)[min(number, 2)] * relaxed * np.where(agrees, 1.0, _FOLLOWING)

@@ -10,7 +10,7 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.suggest import one_of
 
-__all__ = ["EDGES", "FACES", "HexMesh", "elements_of", "merge"]
+__all__ = ["EDGES", "FACES", "HexMesh", "elements_of", "merge", "nodal_area_vectors"]
 
 FACES = np.array([[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]], dtype=np.int32)
 """Corners of the faces −x, +x, −y, +y, −z, +z of an element, anticlockwise seen from outside, shape (6, 4)."""
@@ -165,6 +165,16 @@ class HexMesh:
     def with_nodes(self, **sets: Ints32) -> HexMesh:
         """The same mesh with further node sets."""
         return replace(self, node_sets={**self.node_sets, **sets})
+
+
+def nodal_area_vectors(x: Array, quads: Ints32) -> Array:
+    """Sum of twice the area vectors of the quadrilaterals (F, 4) around every node at positions x (N, 3) [m²], (N, 3);
+    zero at nodes of none."""
+    corners = x[quads]
+    out = np.zeros_like(x)
+    crossed = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    np.add.at(out, quads, crossed[:, None, :].repeat(4, axis=1))
+    return out
 
 
 def elements_of(grid: Ints32) -> Ints32:

@@ -1,1 +1,1 @@
-"""What may touch: deformable bodies with what drives them, obstacles, and all of them as one contact model."""
+"""Deformable bodies with their boundary conditions, rigid obstacles, and the contact model assembled from them."""

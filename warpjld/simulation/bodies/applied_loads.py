@@ -1,4 +1,4 @@
-"""Loads on an object's mesh: nodes and face sets they act on, and what they are at a time (R97)."""
+"""External loads of an object applied to its mesh: nodal forces, face sets and values over time (R97)."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["AppliedLoads", "applied_loads"]
 
 @dataclass(frozen=True, eq=False)
 class AppliedLoads:
-    """Of one object.
+    """External loads of one object.
 
     Attributes:
-        name: Of the object.
-        nodal: Forces on points, and the nodes of each.
-        faces: Loads on faces, and the face set of each.
-        spin: A steady turn, if any.
+        name: Name of the object.
+        nodal: Concentrated loads, with the nodes of each.
+        faces: Surface loads, with the face set of each.
+        spin: Steady rotation; None if there is none.
     """
 
     name: str
@@ -36,14 +36,14 @@ class AppliedLoads:
         return bool(self.nodal or self.faces or self.spin is not None)
 
     def forces(self, frame: float, count: int) -> NDArray[np.float64]:
-        """Concentrated forces at a frame [N], shape (count, 3): of each load evenly on its nodes."""
+        """Nodal forces at a frame [N], shape (count, 3): each load is divided equally among its nodes."""
         out = np.zeros((count, 3))
         for load, nodes in self.nodal:
             out[nodes] += np.array([load.at(axis, frame) for axis in "xyz"]) / len(nodes)
         return out
 
     def added_to(self, loads: Loads, frame: float) -> Loads:
-        """Loads with those on faces, and of turning, at a frame."""
+        """``loads`` with the surface loads and the centrifugal force of a frame added."""
         pressure = {face: one.at("pressure", frame) for one, face in self.faces if one.kind == "pressure"}
         traction = {
             face: (one.at("x", frame), one.at("y", frame), one.at("z", frame))
@@ -64,16 +64,19 @@ class AppliedLoads:
 def applied_loads(
     contact: ContactSpecification, name: str, mesh: HexMesh, local: NDArray[np.float64]
 ) -> tuple[AppliedLoads, HexMesh]:
-    """Loads on an object, and its mesh with the faces they act on named.
+    """Apply the specified loads to an object's mesh.
 
     Args:
-        contact: What is asked.
-        name: Of the object.
-        mesh: On the stage.
+        contact: Specification with the loads.
+        name: Name of the object.
+        mesh: Its mesh in world coordinates.
         local: Its nodes in the object's own frame [m], shape (N, 3).
 
+    Returns:
+        The loads, and the mesh with face sets added for surface loads.
+
     Raises:
-        InputError: Points where the object has none, or no whole face between them.
+        InputError: A point set selects no node, or no complete face of the surface.
     """
     nodal, faces, sets = [], [], dict(mesh.faces)
     for (one, points, kind), load in contact.loads.items():

@@ -1,4 +1,4 @@
-"""What every deformable body of a simulation is to the solver, whatever drives it: a hand with bones, or an object."""
+"""Interface of deformable bodies to the contact solver: a hand with bones, or an object."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ __all__ = ["Bearing", "DeformableBody", "History", "Surroundings"]
 
 @dataclass(frozen=True, eq=False)
 class Bearing:
-    """What an object's support bears at the moment it begins to let go.
+    """Reactions of an object's support at the moment its release begins.
 
     Attributes:
-        forces: Of the points the object stands on [N], shape (N, 3).
-        height: Displacement of the object's handle along the weight's axis [m].
+        forces: Reactions of the points the object stands on [N], shape (N, 3).
+        height: Displacement of the object's handle node along the axis of gravity [m].
     """
 
     forces: NDArray[np.float64]
@@ -33,11 +33,12 @@ class Bearing:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """What is known of the equilibria so far, on which first guesses and fading supports build.
+    """Facts about earlier equilibria that predictors and released supports depend on.
 
     Attributes:
-        carried: Objects that only hands hold, by the hand that holds most: they go along with it in first guesses.
-        bearing: What supports bore when they began to let go, by object.
+        carried: Object → hand that presses most on it, for objects in contact with hands only; the predictor moves them
+            along with that hand.
+        bearing: Support reactions at the begin of the release, by object.
     """
 
     carried: Mapping[str, str] = field(default_factory=dict)
@@ -46,11 +47,11 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What is around a body when its displacement is guessed.
+    """Context for predicting the displacement of a body.
 
     Attributes:
-        carry: Where the hand that alone holds it takes points (n, 3) [m]; None where none does.
-        history: What is known of the equilibria so far.
+        carry: Rigid motion of points (n, 3) [m] with the hand that holds the body; None if no hand alone holds it.
+        history: Facts about the equilibria so far.
     """
 
     carry: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
@@ -59,25 +60,25 @@ class Surroundings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeformableBody(ABC):
-    """A volume mesh of N nodes and E elements that carries a visible surface, with what is prescribed of it.
+    """A volume mesh of N nodes and E elements with Dirichlet conditions and an embedded visible surface.
 
-    Times are in frames from the moment at which the body rests; displacements count from there.
+    Times are in frames from the reference configuration (time 0); displacements are relative to it.
 
     Attributes:
-        name: Of the actor or object.
-        mesh: As it rests.
-        faces: Face set of its outside, which may touch others.
+        name: Name of the actor or object.
+        mesh: Mesh in the reference configuration.
+        faces: Face set of its outer surface, which takes part in contact.
         laws: Constitutive laws by region of the mesh.
-        modulus: Young's modulus under its surface [Pa]: the softer of two gives way more.
-        stress: At rest [Pa], shape (E, 6).
-        surface: Its visible surface at rest [m], shape (V, 3).
-        triangles: Of that surface, shape (T, 3).
-        embedding: How the mesh carries its vertices.
-        embedded: Those that it carries, shape (V,): where flesh is cut off, the others are not.
-        pressure_inside: Face set of its inside, and the pressure there above that outside [Pa].
-        self_contact: What of its surface never meets, where it may touch itself.
-        parts: Of its surface, that may overlap one another.
-        pressing: Vertices whose overlap with other parts contact knows of, shape (V,); None: all.
+        modulus: Young's modulus below its surface [Pa]; the softer body of a pair is the slave.
+        stress: Initial stress [Pa], shape (E, 6).
+        surface: Its visible surface at time 0 [m], shape (V, 3).
+        triangles: Triangles of that surface, shape (T, 3).
+        embedding: Embedding of the visible vertices in the mesh.
+        embedded: Mask of the vertices that the mesh carries, shape (V,); the others lie where the flesh is cut off.
+        pressure_inside: Face set of its inner surface, and the gauge pressure there [Pa]; None without pressure.
+        self_contact: Pairs of facets excluded from self-contact; None without self-contact.
+        parts: Parts of its surface that may overlap one another; None if it has none.
+        pressing: Mask of vertices whose overlap with other parts is resolved by contact, shape (V,); None: all.
     """
 
     name: str
@@ -97,24 +98,27 @@ class DeformableBody(ABC):
 
     @abstractmethod
     def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None) -> NDArray[np.float64]:
-        """Its visible surface [m], shape (V, 3), under a displacement (N, 3); ``covered`` is a skin without contact."""
+        """Visible surface [m], shape (V, 3), under a displacement (N, 3).
+
+        ``covered`` is the skin as the covering alone deforms it [m], shape (V, 3); None for objects.
+        """
 
     @abstractmethod
     def prescribed(self, time: float, history: History) -> Prescribed:
-        """Known displacements at a time."""
+        """Dirichlet conditions at a time."""
 
     @abstractmethod
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings
     ) -> NDArray[np.float64]:
-        """First guess of its displacement at a time from that at an earlier one [m], shape (N, 3)."""
+        """Predictor: displacement at ``time`` estimated from that at ``before`` [m], shape (N, 3)."""
 
     @abstractmethod
-    def way(
+    def path(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
-        """Where some of its nodes (n,) are at the first of some times, and are expected at the others [m]."""
+        """Positions of nodes (n,) at the first time and predicted ones at the others [m], each of shape (n, 3)."""
 
     @abstractmethod
     def timed(self, clock: Callable[[float], float]) -> Self:
-        """The same body, driven as it is at ``clock(time)``."""
+        """A copy whose boundary conditions at ``time`` are those of this body at ``clock(time)``."""

@@ -1,4 +1,4 @@
-"""A hand as a deformable body: flesh around bones that follow an animation (R105, R110)."""
+"""Hand as a deformable body: flesh driven by bones that follow an animation (R105, R110)."""
 
 from __future__ import annotations
 
@@ -21,28 +21,27 @@ from warpjld.simulation.animation import ActorAnimation
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.kept_flesh import RestingFlesh, resting_flesh
 from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits
-from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
+from warpjld.simulation.bodies.skin_parts import SkinParts, digit_of_label, skin_parts
 from warpjld.simulation.specification import FleshMaterial, located
 from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["FLESHED", "BoneMotion", "FleshBody", "build_flesh_body", "flesh_body"]
 
 _SIZES = (1.0, 0.96, 0.9, 0.8, 0.68, 0.55)
-"""Edges of elements that are tried, over the one that is asked for: where thin parts of a hand would not be meshed,
-smaller ones are needed."""
+"""Element edges tried in turn, as fractions of the requested one: thin parts of a hand need smaller elements."""
 FLESHED = 0.5
-"""Share of the flesh in skin from which on it has flesh to give way with."""
+"""Blend of finite elements and covering above which a skin vertex counts as having deformable flesh."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoneMotion:
-    """Joint angles, poses and motions of the bones of a hand at times [frames] from ``start``.
+    """Joint angles, poses and rigid motions of a hand's bones over time [frames from ``start``].
 
     Attributes:
-        hand: Whose bones move.
-        animation: What drives them.
+        hand: Hand with the bones.
+        animation: Animation of the actor.
         start: Frame of time 0.
-        moves: Motions of the bones from the rig's rest at a time.
+        moves: Rigid motions of the bones from the rig's rest pose at a time.
     """
 
     hand: FleshHand
@@ -56,46 +55,46 @@ class BoneMotion:
 
     @property
     def skeleton(self) -> Skeleton:
-        """As the animation has it, limits included."""
+        """Skeleton with the axes and limits of the animation."""
         return self.animation.skeleton
 
     @property
     def bendable(self) -> bool:
-        """Whether the joints have angles that a search may change."""
+        """Whether it is driven by joint angles, which searches may change."""
         return self.animation.bendable
 
     def pose(self, time: float) -> Poses:
-        """One pose."""
+        """Pose at a time."""
         return self.animation.pose(self.start + time)
 
     def angles(self, time: float) -> NDArray[np.float64]:
-        """Joint angles [rad], shape (J, 4)."""
+        """Joint angles at a time [rad], shape (J, 4)."""
         return self.animation.angles(self.start + time)
 
     def posed(self, angles: NDArray[np.float64], time: float) -> Poses:
-        """The pose of other angles (J, 4)."""
+        """Pose of given angles (J, 4), with the root of a time."""
         return self.animation.posed(angles, self.start + time)
 
     def moves_of(self, angles: NDArray[np.float64], time: float) -> Moves:
-        """Motions of the bones at other angles (J, 4)."""
+        """Rigid motions of the bones at given angles (J, 4)."""
         return self.hand.moves(self.posed(angles, time))
 
     def steps(self, ends: Sequence[tuple[NDArray[np.float64], float]], length: float) -> int:
-        """How many steps of at most a length [m] the joints' way takes from angles at a time to others."""
-        one, other = (self.posed(angles, time).positions[0] for angles, time in ends)
-        return max(1, int(np.ceil(float(np.linalg.norm(other - one, axis=1).max()) / length)))
+        """Number of steps between two pairs of angles and time in which no joint moves farther than ``length`` [m]."""
+        first, last = (self.posed(angles, time).positions[0] for angles, time in ends)
+        return max(1, int(np.ceil(float(np.linalg.norm(last - first, axis=1).max()) / length)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FleshBody(DeformableBody):
-    """A hand that is driven by its bones.
+    """A hand driven by its bones.
 
     Attributes:
         shape: Its flesh at time 0.
-        bones: What moves them.
+        bones: Motion of its bones.
         parts: Digits and palm of its skin.
-        alone: Its flesh without what touches it; one for all copies of the body, since it knows the poses it was in.
-        moves: Motions of its bones from the rig's rest at a time.
+        alone: Its flesh without contact; shared by all copies of the body, since it caches equilibria by pose.
+        moves: Rigid motions of its bones from the rig's rest pose at a time.
     """
 
     shape: RestShape
@@ -106,66 +105,72 @@ class FleshBody(DeformableBody):
 
     @property
     def hand(self) -> FleshHand:
-        """Its mesh, with the bones and what they carry."""
+        """Mesh, bones and weights of the hand."""
         return self.shape.hand
 
     @property
     def touches_itself(self) -> bool:
-        """Whether its skin may touch itself."""
+        """Whether self-contact of its skin is considered."""
         return self.self_contact is not None
 
     @property
+    def node_digits(self) -> NDArray[np.str_]:
+        """Digit of every node, or ``palm``; empty for inner nodes, shape (N,)."""
+        labels = [digit_of_label(name) for name in self.hand.label_names]
+        return np.array([*labels, ""])[self.hand.node_labels]
+
+    @property
     def fleshed(self) -> NDArray[np.bool_]:
-        """Vertices with flesh to give way with, shape (V,)."""
+        """Mask of the skin vertices with deformable flesh, shape (V,)."""
         return np.asarray(self.shape.blend > FLESHED)
 
     def has_flesh(self, part: str) -> bool:
-        """Whether most of a digit's skin, or the palm's, has flesh to give way with."""
+        """Whether most of the skin of a digit or the palm has deformable flesh."""
         return bool(self.fleshed[self.parts.mask(part)].mean() > 0.5)
 
     def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None) -> NDArray[np.float64]:
-        """Its skin [m], shape (V, 3): under a displacement (N, 3), as ``covered`` (V, 3) where it has no flesh."""
+        """Skin [m], shape (V, 3), under a displacement (N, 3); equal to ``covered`` (V, 3) where it has no flesh."""
         assert covered is not None
         return self.shape.deformed(displacement, covered)
 
     def prescribed(self, time: float, history: History | None = None) -> Prescribed:
-        """Displacements of the bones' nodes and of those where the flesh was cut off."""
+        """Displacements of the bones' nodes and of the cut nodes."""
         return _held_by_bones(self.shape, self.moves(time))
 
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings | None = None
     ) -> NDArray[np.float64]:
-        """First guess of a displacement (N, 3): flesh carried along by its bones."""
+        """Predictor: displacement (N, 3) of flesh that moves along with its bones."""
         start = self.shape.start
         return self.hand.guess(start.to(self.moves(before)), start.to(self.moves(time)), displacement)
 
     def carry(self, before: float, time: float, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points (n, 3) [m] go that go along with the hand as a whole."""
+        """Points (n, 3) [m] moved rigidly with the hand's first bone from one time to another."""
         return self.moves(before).to(self.moves(time)).of(np.zeros(len(points), np.int64), points)
 
-    def way(
+    def path(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
-        """Where nodes are, and are expected to be [m]."""
+        """Current and predicted positions of nodes [m]."""
         rest, first = self.mesh.nodes[nodes], times[0]
         return [rest + (displacement if t == first else self.guess(first, t, displacement))[nodes] for t in times]
 
     def timed(self, clock: Callable[[float], float]) -> Self:
-        """The same hand, driven as it is at ``clock(time)``."""
+        """A copy whose bones at ``time`` are where this hand's are at ``clock(time)``."""
         moves = self.moves
         return replace(self, moves=lambda time: moves(clock(time)))
 
     def driven(self, animation: ActorAnimation) -> Self:
-        """The same hand, driven by an animation of the same actor with edits laid over it."""
+        """A copy driven by an edited animation of the same actor."""
         bones = replace(self.bones, animation=animation)
         return replace(self, bones=bones, moves=bones.moves)
 
 
 def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: float) -> tuple[FleshBody, list[str]]:
-    """An actor's flesh, in the shape it has at a frame, and notes on its mesh.
+    """Mesh an actor's flesh in its pose at a frame; returns the body and notes on its mesh.
 
     Raises:
-        InputError: It cannot be meshed in that pose; names the line of its FLESH.
+        InputError: It cannot be meshed in that pose; names the line of its FLESH command.
     """
     poses, skin, notes = actor.pose(start), actor.skin(start), []
     flesh, element = _meshed(actor, material, poses, skin)
@@ -193,13 +198,13 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
 def _meshed(
     actor: ActorAnimation, material: FleshMaterial, poses: Poses, skin: NDArray[np.float64]
 ) -> tuple[RestingFlesh, float]:
-    """A hand where its rig rests and in a pose, and its elements' edge [m].
+    """Hand meshed at the rig's rest and carried to a pose, with its element edge [m].
 
-    Whether some element at a cut or between two digits comes out distorted hangs on where the grid happens to lie: a
-    grid a little finer has it elsewhere. Thin parts want smaller elements.
+    Whether elements at a cut or between two digits are distorted depends on the position of the grid, so slightly
+    finer grids are tried in turn. Thin parts need smaller elements.
 
     Raises:
-        InputError: It cannot be meshed at any of these sizes: what was wrong with the one that was asked for.
+        InputError: No size succeeds; gives the failure at the requested size.
     """
     failure: InputError | None = None
     for share in _SIZES:
@@ -221,7 +226,7 @@ def flesh_body(
     bones: BoneMotion,
     parts: SkinParts,
 ) -> FleshBody:
-    """A hand of that shape at rest, with its laws, what moves its bones, and the parts of its whole skin."""
+    """Assemble a flesh body from its rest shape, constitutive laws, bone motion and the parts of its whole skin."""
     hand, degrees = shape.hand, _held_by_bones(shape, bones.moves(0.0)).degrees
     return FleshBody(
         name=name,
@@ -245,18 +250,18 @@ def flesh_body(
 
 
 def _held_by_bones(shape: RestShape, motion: Moves) -> Prescribed:
-    """Displacements of the bones' nodes and of those where the flesh was cut off, under motions from the rig's rest."""
+    """Displacements of bone nodes and cut nodes under rigid motions of the bones from the rig's rest pose."""
     moves = shape.start.to(motion)
     known = shape.hand.prescribed_by(moves)
     cut = np.setdiff1d(shape.cut, known.degrees[::3] // 3)
     if not len(cut):
         return known
     x = shape.hand.mesh.nodes[cut]
-    return known + _whole(cut, moves.blended(shape.hand.weights[cut], x) - x)
+    return known + _all_axes(cut, moves.blended(shape.hand.weights[cut], x) - x)
 
 
-def _whole(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:
-    """All three displacements of nodes."""
+def _all_axes(nodes: NDArray[np.int64], moved: NDArray[np.float64]) -> Prescribed:
+    """Dirichlet conditions for all three components of nodes (n,) with displacements (n, 3) [m]."""
     order = np.argsort(nodes)
     degrees = (3 * nodes[order][:, None] + np.arange(3)).ravel()
     return Prescribed(degrees, moved[order].ravel())

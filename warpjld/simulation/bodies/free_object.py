@@ -1,7 +1,7 @@
-"""Where a free object goes when hands close on it: a first guess for the contact solver.
+"""Rigid predictor for a free object on which hands close: the placement with the least overlap.
 
-Nothing but contact holds such an object, and an equilibrium that lies millimetres away is far for Newton's method. As a
-rigid body that overlaps everything softly it finds its way in a moment.
+Only contact holds such an object, and an equilibrium millimetres away is out of reach of Newton's method. Minimising a
+penalty of the overlap over rigid motions is cheap and comes near to it.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ from warpjld.fem.contact.obstacles.facets import Facets
 __all__ = ["RigidMove", "settle_free_object"]
 
 _ROUNDS = 40
+"""Most Gauss–Newton iterations."""
 _STILL = 1e-7
-"""Steps shorter than this share of the object's size end the search."""
+"""Step below which the iteration has converged, relative to the object's size."""
 
 _RELUCTANCE = 1e-3
-"""Stiffness that keeps the object where it is, over that of what touches it."""
+"""Regularisation (Levenberg), relative to the total penalty weight."""
 
 _HARD = 10.0
-"""Weight of obstacles over flesh."""
+"""Penalty weight of obstacles relative to that of flesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +35,10 @@ class RigidMove:
     """A rigid motion x → R (x − centre) + centre + shift.
 
     Attributes:
-        turn: R.
-        centre: [m], shape (3,).
-        shift: [m], shape (3,).
-        overlap: How deep the deepest point is still inside [m], 0 where the object is free.
+        turn: Rotation R.
+        centre: Fixed point of the rotation [m], shape (3,).
+        shift: Translation [m], shape (3,).
+        overlap: Remaining depth of the deepest point [m]; 0 without overlap.
     """
 
     turn: Rotation
@@ -46,7 +47,7 @@ class RigidMove:
     overlap: float
 
     def of(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where points (n, 3) [m] of the object go."""
+        """Points of the object (n, 3) [m] moved."""
         return np.asarray(self.turn.apply(points - self.centre) + self.centre + self.shift)
 
 
@@ -57,16 +58,16 @@ def settle_free_object(
     obstacles: Sequence[Obstacle],
     time: float,
 ) -> RigidMove:
-    """Move an object as one to where it overlaps others least, evenly on all sides.
+    """Rigid motion of an object that minimises its overlap with flesh and obstacles.
 
-    Minimises Σ ½ w d² over all points with a negative distance d, by the Gauss–Newton method in six motions.
+    Minimises Σ ½ w d² over all points with a negative distance d, by the Gauss–Newton method in six degrees of freedom.
 
     Args:
-        nodes: Of the object [m], shape (N, 3).
-        surface: Triangles of its outside, shape (T, 3).
-        others: Points of what touches it [m], shape (M, 3).
-        obstacles: What does not give way.
-        time: Theirs.
+        nodes: Nodes of the object [m], shape (N, 3).
+        surface: Triangles of its outer surface, shape (T, 3).
+        others: Points of the skins around it [m], shape (M, 3).
+        obstacles: Rigid obstacles.
+        time: Time at which the obstacles are evaluated [frames].
     """
     used = np.unique(surface)
     centre = nodes[used].mean(axis=0)

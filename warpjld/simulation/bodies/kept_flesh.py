@@ -1,4 +1,4 @@
-"""Meshes of flesh kept in files: making one takes many seconds, reading it a tenth of one."""
+"""Cache of flesh meshes on disk: meshing takes many seconds, reading a mesh about 0.1 s."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ __all__ = ["RestingFlesh", "resting_flesh"]
 
 @dataclass(frozen=True, eq=False)
 class RestingFlesh:
-    """A hand's flesh where contact begins.
+    """A hand's flesh mesh at the rig's rest and in the pose at which contact begins.
 
     Attributes:
-        built: As it was meshed, at the rig's rest.
-        hand: At rest in the pose.
-        gap: Greatest distance of its mesh's skin nodes from the skin there [m].
-        cushions: Flesh under the phalanges, at the rig's rest.
-        notes: Of files that could not be used.
+        built: Hand as meshed, at the rig's rest.
+        hand: Hand in the pose, which is its stress-free reference configuration.
+        gap: Largest distance of the mesh's skin nodes from the skin in the pose [m].
+        cushions: Thickness of the flesh under the phalanges, at the rig's rest.
+        notes: Messages about cache files that could not be used.
     """
 
     built: FleshHand
@@ -45,7 +45,7 @@ class RestingFlesh:
 
 @dataclass(frozen=True, eq=False)
 class _Meshed:
-    """All of a ``FleshHand`` that its rig does not have already."""
+    """Fields of a ``FleshHand`` that cannot be taken from its rig."""
 
     flesh: Flesh
     place: Moves
@@ -60,7 +60,7 @@ class _Meshed:
 
 @dataclass(frozen=True, eq=False)
 class _Posed:
-    """What a pose changes of a mesh; the greatest distance from the skin."""
+    """Fields of a mesh that depend on the pose, and its largest distance from the skin [m]."""
 
     nodes: NDArray[np.float64]
     node_sets: dict[str, NDArray[np.int32]]
@@ -68,18 +68,20 @@ class _Posed:
 
 
 _CLASSES = (_Meshed, Flesh, HexMesh, Bone, Embedding, Fit, Moves, Cushion)
+"""Record types that the cache file of a mesh may contain."""
 _SHARED = ("place", "weights", "skin_faces", "skin_labels", "label_names", "excluded", "skin_fringes")
+"""Fields that ``FleshHand`` and ``_Meshed`` have in common."""
 
 
 def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArray[np.float64]) -> RestingFlesh:
-    """A rig's flesh, meshed at its rest and carried to a pose; out of files where that was done before.
+    """Flesh of a rig, meshed at its rest and carried to a pose; read from the cache if it is there.
 
     Args:
         rig: Surface and skeleton.
         element: Edge length of the elements [m].
-        name: As of ``build_flesh_hand``.
-        poses: One pose.
-        skin: Its surface there [m], shape (V, 3).
+        name: See ``build_flesh_hand``.
+        poses: The pose (a batch of one).
+        skin: Its surface in that pose [m], shape (V, 3).
 
     Raises:
         InputError: It cannot be meshed, or not in that pose.

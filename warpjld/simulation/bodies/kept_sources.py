@@ -1,4 +1,4 @@
-"""Which of the program's files meshes of flesh and objects follow from."""
+"""Source files of the program on which cached meshes of flesh and objects depend."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ MESHING = (
     "simulation/**/*.py",
     "skeleton/**/*.py",
 )
-"""Patterns: more than meshing needs, so that no mesh is ever out of date."""
+"""Glob patterns relative to the package; more than meshing needs, so that no cached mesh is ever out of date."""

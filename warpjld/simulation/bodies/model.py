@@ -1,4 +1,4 @@
-"""Everything that may touch, as one body with pairs of surfaces, and what drives it (R103, R109, R110)."""
+"""Contact model: all bodies merged into one mesh, with pairs, loads and Dirichlet conditions (R103, R109, R110)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem import Body, Loads, Material, Prescribed, merge
 from warpjld.fem.contact import Bond, Obstacle, Pair
+from warpjld.fem.contact.results.nodal_contact import tributary_areas
 from warpjld.simulation.animation import AngleEdit, Animation
 from warpjld.simulation.bodies.deformable_body import Bearing, DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.flesh_body import FleshBody
@@ -23,13 +24,13 @@ __all__ = ["ContactModel", "PairOwners", "assemble_model"]
 
 @dataclass(frozen=True)
 class PairOwners:
-    """What a pair of surfaces belongs to: actors' and objects' names, an obstacle's last."""
+    """Names of the actors or objects whose surfaces form a contact pair; an obstacle is always the master."""
 
     slave: str
     master: str
 
     def other(self, name: str) -> str | None:
-        """What one of the two may touch, itself where it touches itself; None where it is neither."""
+        """Contact partner of one of the two (itself for self-contact); None if ``name`` is neither."""
         if name == self.slave:
             return self.master
         return self.slave if name == self.master else None
@@ -40,16 +41,16 @@ class ContactModel:
     """All bodies of a simulation merged into one, hands first.
 
     Attributes:
-        hands: In order.
-        objects: In order, after them.
-        obstacles: By name.
-        body: Mesh and laws.
-        spans: Rows of the merged nodes that belong to each hand and object, by name.
-        pairs: What may touch what.
-        owners: Whose surfaces those are.
-        loads: From time 0 on.
+        hands: Hands, in the order of their nodes.
+        objects: Deformable objects, in order, after the hands.
+        obstacles: Rigid obstacles by name.
+        body: Merged mesh and laws.
+        spans: Rows of the merged nodes of each hand and object, by name.
+        pairs: Contact pairs.
+        owners: Names of the bodies of each pair.
+        loads: Gravity and inner pressures, constant in time.
         start: Frame of time 0.
-        animation: What drives all.
+        animation: Animation that drives the model; None where none is edited.
     """
 
     hands: tuple[FleshBody, ...]
@@ -69,11 +70,15 @@ class ContactModel:
         return (*self.hands, *self.objects)
 
     def named(self, name: str) -> DeformableBody:
-        """The body of that name."""
+        """Body by name."""
         return next(body for body in self.bodies if body.name == name)
 
+    def tributary_areas(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Surface area around every node at positions x (N, 3) [m²], 0 for inner nodes, shape (N,)."""
+        return sum((tributary_areas(self.body.mesh, body.faces, x) for body in self.bodies), np.zeros(len(x)))
+
     def prescribed(self, time: float, history: History) -> Prescribed:
-        """All known displacements at a time."""
+        """Dirichlet conditions of all bodies at a time."""
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
         for body in self.bodies:
             known = body.prescribed(time, history)
@@ -83,7 +88,7 @@ class ContactModel:
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], history: History
     ) -> NDArray[np.float64]:
-        """First guess of the displacement (N, 3) at a time from that at an earlier one."""
+        """Predictor: displacement (N, 3) [m] at ``time`` from that at ``before``, with Dirichlet values inserted."""
         out = displacement.copy()
         for body in self.bodies:
             span = self.spans[body.name]
@@ -94,7 +99,7 @@ class ContactModel:
         return out
 
     def loads_at(self, time: float, history: History) -> Loads:
-        """What pulls and pushes at a time beside contact."""
+        """External loads at a time, including the fading reactions of released supports."""
         out = np.zeros((0, 3))
         for one in self.objects:
             fading = None if one.support is None else one.support.fading(time, history.bearing.get(one.name))
@@ -117,13 +122,13 @@ class ContactModel:
         reactions: NDArray[np.float64],
         nodal: NDArray[np.float64],
     ) -> History:
-        """What is known after an equilibrium: what holds the free objects, and what supports bear.
+        """History updated by an equilibrium: which hand holds each free object, and support reactions.
 
         Args:
-            history: Before it.
-            time: Of the equilibrium.
-            displacement: Of all nodes [m], shape (N, 3).
-            reactions: Of what is prescribed [N], shape (N, 3).
+            history: History before the equilibrium.
+            time: Its time [frames].
+            displacement: Displacements of all nodes [m], shape (N, 3).
+            reactions: Reactions of the Dirichlet conditions [N], shape (N, 3).
             nodal: Contact forces of each pair [N], shape (P, N, 3).
         """
         hands = {hand.name for hand in self.hands}
@@ -144,7 +149,7 @@ class ContactModel:
         return History(carried, bearing)
 
     def edited(self, edits: Sequence[AngleEdit]) -> ContactModel:
-        """The same with edits laid over its animation: hands bend otherwise, and what follows them goes along."""
+        """A copy driven by its animation with edits applied; hands, objects and obstacles that change are replaced."""
         if not edits:
             return self
         assert self.animation is not None
@@ -170,7 +175,7 @@ class ContactModel:
     def _carry(
         self, name: str | None, before: float, time: float
     ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]] | None:
-        """Where a hand takes points along as a whole."""
+        """Rigid motion of points with a hand between two times; None without a hand."""
         if name is None:
             return None
         hand = next(hand for hand in self.hands if hand.name == name)
@@ -186,12 +191,12 @@ def assemble_model(
     start: float = 0.0,
     animation: Animation | None = None,
 ) -> ContactModel:
-    """Merge bodies and pair their surfaces: the softer side of two is the one where pressures live.
+    """Merge bodies and form contact pairs; the softer surface of a pair is the slave, which carries the multipliers.
 
-    ``start`` is the frame of time 0; ``animation`` what drives all, where edits may be laid over it.
+    ``start`` is the frame of time 0; ``animation`` drives all bodies and is needed for edits.
 
     Raises:
-        InputError: Nothing that deforms, two of one name, or a bond to what is not there.
+        InputError: No deformable body, a name used twice, or a bond to an object that does not deform.
     """
     bodies: list[DeformableBody] = [*hands, *objects]
     if not bodies:
@@ -225,7 +230,7 @@ def assemble_model(
 
 
 def _offsets(body: DeformableBody, how: Callable[..., NDArray[np.float64]]) -> NDArray[np.float64]:
-    """How far what is seen lies outside a body's faces or nodes [m], shape (N,)."""
+    """Height of a body's visible surface above its mesh surface [m], shape (N,)."""
     carried = body.triangles[body.embedded[body.triangles].all(axis=1)]
     return how(body.mesh, body.faces, body.surface, carried)
 
@@ -233,7 +238,7 @@ def _offsets(body: DeformableBody, how: Callable[..., NDArray[np.float64]]) -> N
 def _pairs(
     bodies: Sequence[DeformableBody], obstacles: Mapping[str, Obstacle], contact: ContactSpecification, paper: bool
 ) -> tuple[list[Pair], list[PairOwners]]:
-    """All pairs. The paper's loop repels objects from the skin, and does not know skin that meets itself."""
+    """All contact pairs. In the paper's loop objects are slaves of the skin, and there is no self-contact."""
     pairs, owners = [], []
     for k, one in enumerate(bodies):
         for other in bodies[k + 1 :]:

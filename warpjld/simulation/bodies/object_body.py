@@ -1,4 +1,4 @@
-"""An object that deforms: what leads it, what is prescribed of it, and what it stands on (R92, R128)."""
+"""Deformable object with its Dirichlet conditions, loads and support (R92, R128)."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from warpjld.simulation.state_variables import Points, PrescribedPoints
 __all__ = ["ObjectBody", "build_object_body", "object_body"]
 
 _FOOT = 0.05
-"""Share of a lifted object's height, from below, whose points hold it until then."""
+"""Lowest share of a lifted object's height; the points in it support the object until it is lifted."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ObjectBody(DeformableBody):
-    """An object that deforms.
+    """A deformable object.
 
     Attributes:
         local: Its nodes in the object's own frame [m], shape (N, 3).
-        place: Where the animation puts it at a time: one placement.
-        states: What is prescribed, and the nodes it is prescribed for.
+        place: Placement by the animation at a time (a batch of one).
+        states: Prescribed state variables, with the nodes of each.
         start: Frame of time 0.
-        support: What it stands on until a hand takes its weight.
-        other: What is prescribed instead of all this, at a time.
-        notes: What is to be told of its mesh.
-        loads: Forces on it.
+        support: Support it stands on until a hand takes its weight; None without.
+        other: Dirichlet conditions at a time that replace those of states and support, for branches; None: none.
+        notes: Messages about its mesh.
+        loads: External loads on it.
     """
 
     local: NDArray[np.float64]
@@ -56,11 +56,11 @@ class ObjectBody(DeformableBody):
     def deformed(
         self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None = None
     ) -> NDArray[np.float64]:
-        """Its surface [m], shape (V, 3), under a displacement of its nodes (N, 3)."""
+        """Visible surface [m], shape (V, 3), under a displacement of its nodes (N, 3)."""
         return self.surface + self.embedding.carry(displacement)
 
     def holds(self, state: PrescribedPoints, time: float) -> bool:
-        """Whether points go where the object goes."""
+        """Whether the points of a state variable follow the object's placement at a time."""
         stands = self.support is None or self.support.stands(time)
         return self.other is None and stands and state.holds(self.start + time)
 
@@ -72,13 +72,13 @@ class ObjectBody(DeformableBody):
         return any(self.holds(state, time) for state, _ in self.states)
 
     def _guided(self, time: float) -> bool:
-        """Whether something else than its states leads it."""
+        """Whether conditions of a branch, or the handle of its support, drive it instead of its state variables."""
         if self.other is not None:
             return True
         return self.support is not None and not self.support.stands(time) and time < self.support.free
 
     def prescribed(self, time: float, history: History) -> Prescribed:
-        """Displacements of its prescribed points (R128)."""
+        """Dirichlet conditions of its prescribed points (R128)."""
         if self.other is not None:
             return self.other(time)
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
@@ -105,51 +105,50 @@ class ObjectBody(DeformableBody):
     def guess(
         self, before: float, time: float, displacement: NDArray[np.float64], around: Surroundings
     ) -> NDArray[np.float64]:
-        """First guess of a displacement (N, 3): with what leads or carries it; what is free is where it was.
+        """Predictor: displacement (N, 3) with the rigid motion of what drives or carries the object; zero when free.
 
-        Where hands close on it, it overlaps them there, and friction takes hold of it in that place. Put where it
-        overlaps least, as a body without friction, it was taken out of grips that could have held it.
+        A free object on which hands close stays in place and overlaps them, so that friction holds it there. Moving it
+        to the least overlap, as if frictionless, took it out of grips that could have held it.
         """
         at = self.mesh.nodes + displacement
         if self._held(time):
             return displacement + (_rigid(self.place(before), self.place(time), at) - at)
         if self._guided(time):
-            return displacement + _along_with(self.prescribed(time, around.history), displacement)
+            return displacement + _mean_shift(self.prescribed(time, around.history), displacement)
         if self._led:
             return displacement
         return displacement if around.carry is None else displacement + (around.carry(at) - at)
 
-    def way(
+    def path(
         self, times: Sequence[float], displacement: NDArray[np.float64], nodes: NDArray[np.integer]
     ) -> list[NDArray[np.float64]]:
-        """Where nodes are, and are expected to be [m]."""
+        """Current and predicted positions of nodes [m]."""
         x = self.mesh.nodes[nodes] + displacement[nodes]
         if not self._held(times[-1]):
-            return [x for _ in times]  # what is free goes where it is pushed
+            return [x for _ in times]  # the motion of a free object is not known in advance
         local = self.place(times[0]).to_local(x)[0]
         return [self.place(t).apply(local)[0] for t in times]
 
     def timed(self, clock: Callable[[float], float]) -> Self:
-        """The same object, placed as it is at ``clock(time)``."""
+        """A copy placed at ``time`` as this object is at ``clock(time)``."""
         place = self.place
         return replace(self, place=lambda time: place(clock(time)))
 
     def driven(self, animation: ObjectAnimation) -> Self:
-        """The same object, driven by another animation of it."""
+        """A copy driven by another animation of the object."""
         return replace(self, place=_place_at(animation, self.start))
 
 
 def build_object_body(
     animation: ObjectAnimation, contact: ContactSpecification, start: float, place: Places | None = None
 ) -> ObjectBody:
-    """An object that deforms, where it is at a frame or at another place.
+    """Mesh a deformable object at its placement at a frame, or at ``place``, and apply its conditions.
 
     Raises:
-        InputError: It cannot be meshed; names the line of its PHYSICAL.
+        InputError: It cannot be meshed, or its points select nothing; names the line of its PHYSICAL command.
     """
     name, thing = animation.name, animation.thing
     physical = contact.physical[name]
-
     at = _place_at(animation, start)
     try:
         volume = mesh_object(name, thing, physical, at(0.0) if place is None else place)
@@ -174,7 +173,7 @@ def object_body(
     start: float,
     support: ObjectSupport | None = None,
 ) -> ObjectBody:
-    """A meshed object with what leads it."""
+    """Assemble a deformable object from its mesh, placement over time, state variables and support."""
     physical = volume.physical
     return ObjectBody(
         name=volume.name,
@@ -198,14 +197,18 @@ def object_body(
 
 
 def _place_at(animation: ObjectAnimation, start: float) -> Callable[[float], Places]:
-    """Where an object is at a time [frames] from a frame."""
+    """Placement of an object as a function of time [frames from ``start``], cached."""
     return lru_cache(maxsize=8)(lambda time: animation.place(start + time))
 
 
 def _states(
     contact: ContactSpecification, object_name: str, local: NDArray[np.float64], stage: NDArray[np.float64]
 ) -> list[tuple[PrescribedPoints, NDArray[np.int64]]]:
-    """What is prescribed of an object, and for which nodes."""
+    """State variables of an object, with the nodes of each.
+
+    Raises:
+        InputError: A point set selects no node.
+    """
     states = []
     for (name, points), state in contact.prescribed.items():
         if name == object_name:
@@ -219,7 +222,7 @@ def _states(
 def _lifted(
     contact: ContactSpecification, grip: GripSpecification, volume: ObjectMesh
 ) -> tuple[ObjectMesh, ObjectSupport]:
-    """The object with its weight, and what it stands on."""
+    """Object mesh with the density that gives the requested weight, and its support."""
     pull = np.array(contact.pull)
     axis = int(np.argmax(np.abs(pull)))
     if grip.weight is not None:
@@ -228,14 +231,14 @@ def _lifted(
     return volume, ObjectSupport(handle_of(volume.mesh.nodes), axis)
 
 
-def _along_with(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far an object goes, axis by axis, whose known degrees of freedom go to these values [m], shape (3,)."""
+def _mean_shift(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean change of the prescribed displacements by axis [m], shape (3,); 0 on axes without any."""
     change = known.values - displacement.reshape(-1)[known.degrees]
     axes = known.degrees % 3
     return np.array([change[axes == axis].mean() if (axes == axis).any() else 0.0 for axis in range(3)])
 
 
 def _rigid(before: Places, after: Places, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points of a body that goes from one place to another."""
+    """Points (n, 3) [m] moved rigidly from one placement to another."""
     turn = Rotation.from_quat(after.rotation[0])
     return np.asarray(turn.apply(before.to_local(points)[0]) + after.position[0])

@@ -1,4 +1,4 @@
-"""The volume of an object: hexahedra inside its surface, or through the wall of a hollow one (R104)."""
+"""Hexahedral mesh of an object: its solid volume, or the wall of a hollow one (R104)."""
 
 from __future__ import annotations
 
@@ -22,37 +22,38 @@ from warpjld.simulation.specification import ObjectMaterial
 __all__ = ["ObjectMesh", "mesh_object"]
 
 _ACROSS = 12
-"""Elements across an object's smallest extent, where their size is not given."""
+"""Default number of elements across an object's smallest extent."""
 
 _WALL = 2
-"""Elements through a wall."""
+"""Number of element layers through a wall."""
 _MANY = 1e6
-"""Elements of an object that are too many."""
+"""Largest estimated number of elements of an object."""
 
 _FLAT = 0.03
-"""Mean square by which the faces at a node turn from their mean normal, from which on they are an edge."""
+"""Relative cutoff for the singular values of the mean outer product of the face normals at a node; smaller ones count
+as zero, as at a smooth node."""
 
 _UPRIGHT = 0.02
-"""Scaled Jacobian of a wall's elements."""
+"""Least scaled Jacobian of a wall's elements."""
 
 _REACH = 3.0
-"""How far a visible surface may lie outside its mesh, in elements."""
+"""Largest distance of the visible surface from its mesh, in element edges."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectMesh:
-    """An object that deforms, where it stands at time 0.
+    """Volume mesh of a deformable object at time 0.
 
     Attributes:
-        name: Its region and the face set of its outside; ``<name>.inside`` is that of its inside.
-        mesh: On the stage.
-        local: The nodes in the object's own frame [m], shape (N, 3).
+        name: Name of its region and of the face set of its outer surface; ``<name>.inside`` is that of its inner one.
+        mesh: Mesh in world coordinates.
+        local: Its nodes in the object's own frame [m], shape (N, 3).
         physical: Law, wall and pressure.
-        visible: Its surface, carried by the mesh.
-        surface: Its surface at time 0 [m], shape (V, 3).
-        faces: Triangles of its surface, shape (T, 3).
-        stress: Stress that holds the pressure inside in its shape at time 0 [Pa], shape (E, 6) (R98).
-        notes: Of files that could not be used.
+        visible: Embedding of the visible surface in the mesh.
+        surface: Visible surface at time 0 [m], shape (V, 3).
+        faces: Triangles of that surface, shape (T, 3).
+        stress: Initial stress, in equilibrium with the inner pressure at time 0 [Pa], shape (E, 6) (R98).
+        notes: Messages about cache files that could not be used.
     """
 
     name: str
@@ -67,21 +68,21 @@ class ObjectMesh:
 
     @property
     def inside(self) -> str:
-        """Face set of its inside."""
+        """Name of the face set of its inner surface."""
         return f"{self.name}.inside"
 
 
 def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: Places) -> ObjectMesh:
-    """Mesh an object.
+    """Mesh an object, or read its mesh from the cache.
 
-    Built-in balls, boxes and cylinders get regular meshes; other surfaces a grid fitted to them. The wall of a hollow
-    one follows its outside at an even depth.
+    Built-in balls, boxes and cylinders get structured meshes, other surfaces a grid fitted to them. The wall of a
+    hollow object is extruded inwards from the outer surface at constant depth.
 
     Args:
-        name: Of the object.
+        name: Name of the object.
         thing: Its surface.
-        physical: How it deforms.
-        place: One placement: where it is at time 0.
+        physical: Material, wall, pressure and element size.
+        place: Placement at time 0 (a batch of one).
 
     Raises:
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
@@ -107,7 +108,7 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
 
 @dataclass(frozen=True, eq=False)
 class _Local:
-    """Of an object in its own frame: what ``ObjectMesh`` has of it elsewhere."""
+    """Mesh, embedding and initial stress in the object's own frame, which are cached."""
 
     mesh: HexMesh
     visible: Embedding
@@ -115,7 +116,7 @@ class _Local:
 
 
 def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
-    """An object's mesh in its own frame, as ``mesh_object`` has it."""
+    """Mesh an object in its own frame (see ``mesh_object``)."""
     size = physical.element or float(thing.size.min()) / _ACROSS
     _refuse_many(thing, physical.wall, size)
     if thing.origin == "ball":
@@ -145,7 +146,11 @@ def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
 
 
 def _refuse_many(thing: GraspObject, wall: float, size: float) -> None:
-    """Raise before hours are spent on meshing."""
+    """Reject an element size with more elements than can be solved, before meshing.
+
+    Raises:
+        InputError: Estimated number of elements above ``_MANY``.
+    """
     x, y, z = (float(extent) for extent in thing.size)
     room = 2.0 * _WALL * (x * y + y * z + z * x) * size if wall else x * y * z
     if room > _MANY * size**3:
@@ -172,10 +177,13 @@ def _cylinder(thing: GraspObject, size: float) -> HexMesh:
 
 
 def _shell(solid: HexMesh, wall: float) -> HexMesh:
-    """Elements through a wall under the surface of a mesh; as thick at edges as elsewhere, where faces are wide enough.
+    """Extrude a wall inwards from the surface of a mesh.
+
+    Nodes move so that all adjacent faces are offset by the same depth, also at edges and corners; where that distorts
+    elements, along the mean of that direction and the normal, or along the normal.
 
     Raises:
-        InputError: The wall folds.
+        InputError: The wall is so thick that elements fold.
     """
     quads = solid.quads(solid.boundary())
     used, corners = np.unique(quads, return_inverse=True)
@@ -204,10 +212,14 @@ def _shell(solid: HexMesh, wall: float) -> HexMesh:
 
 
 def _holding(mesh: HexMesh, inside: str, physical: ObjectMaterial) -> NDArray[np.float64]:
-    """Stress in equilibrium with the pressure inside, as a linear body of that shape would carry it [Pa], (E, 6)."""
+    """Stress of a linear elastic body of that shape under the inner pressure [Pa], shape (E, 6).
+
+    Raises:
+        InputError: The pressure strains the wall by more than half.
+    """
     body = Body(mesh, LinearElastic(physical.young, physical.poisson))
-    nothing = Prescribed(np.empty(0, np.int64), np.empty(0))
-    found = solve(body, nothing, Loads(pressure={inside: physical.pressure}), free="hold")
+    unconstrained = Prescribed(np.empty(0, np.int64), np.empty(0))
+    found = solve(body, unconstrained, Loads(pressure={inside: physical.pressure}), free="hold")
     strain = float(np.abs(found.displacement).max()) / mesh.size
     if strain > 0.5:
         raise InputError(
@@ -218,7 +230,7 @@ def _holding(mesh: HexMesh, inside: str, physical: ObjectMaterial) -> NDArray[np
 
 
 def _turned(stress: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Stresses xx yy zz xy yz zx (E, 6) in turned axes."""
+    """Stresses xx yy zz xy yz zx (E, 6), rotated by a matrix (3, 3)."""
     full = stress[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
     full = np.einsum("ij,ejk,lk->eil", turn, full, turn)
     return np.stack([full[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))], axis=1)

@@ -1,21 +1,37 @@
-"""Rigid objects as obstacles: built-in shapes are exact, with edges rounded."""
+"""Rigid objects as contact obstacles: exact for built-in shapes, with rounded edges."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.meshes import RigidMesh
 from warpjld.fem.contact.obstacles.obstacle import RigidMotion
 from warpjld.fem.contact.obstacles.solids import Box, Cylinder, Sphere
-from warpjld.grasp import GraspObject
+from warpjld.grasp import GraspObject, Places
 
-__all__ = ["rigid_obstacle"]
+__all__ = ["placed_motion", "rigid_obstacle"]
 
 _ROUNDED = 1e-3
-"""Radius of the edges of boxes and cylinders as contact feels them [m]: skin has no corner to lie around."""
+"""Radius to which contact rounds the edges of boxes and cylinders [m], chosen because skin cannot bend around a sharp
+edge."""
+
+
+def placed_motion(place: Callable[[float], Places], start: float) -> RigidMotion:
+    """Motion of an obstacle that follows a placement by frame number; its times are in frames from ``start``."""
+
+    def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        here = place(start + time)
+        return here.position[0], here.rotation[0]
+
+    return motion
 
 
 def rigid_obstacle(thing: GraspObject, motion: RigidMotion) -> Obstacle:
-    """An object that does not give way and moves as a whole."""
+    """Obstacle for a rigid object with a motion: analytic for balls, boxes and cylinders, a mesh otherwise."""
     middle = 0.5 * (thing.vertices.min(axis=0) + thing.vertices.max(axis=0))
     edge = min(_ROUNDED, 0.2 * float(thing.size.min()))
     if thing.origin == "ball":

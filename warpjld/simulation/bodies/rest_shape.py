@@ -1,8 +1,9 @@
-"""A hand's flesh in the shape it has before contact: JLD where there is none, finite elements where there is (R91).
+"""Reference configuration of a hand's flesh: the mesh carried to the pose at which contact begins (R91).
 
-The mesh is made at the rig's rest, where digits are apart, and carried to the pose by the covering itself: its skin
-nodes go where the covering puts the skin, its bones move rigidly, what lies between follows smoothly. That shape is
-free of stress: bent joints hold no false forces, and the first frame that is solved looks as the one before it.
+The mesh is generated at the rig's rest, where digits are apart, and carried to the pose by the covering: its skin nodes
+move with the covered skin, its bones rigidly, and nodes in between by a harmonic field. That configuration is
+stress-free: bent joints cause no spurious forces, and the first solved frame looks like the one before it. Where no
+flesh is meshed, the surface is the covering's (JLD).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.flesh_hand import FleshHand
+from warpjld.fem.mesh.harmonic import harmonic_field
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.mesh.untangle import as_far, improve
 from warpjld.skeleton import Poses
@@ -24,41 +26,44 @@ from warpjld.skeleton import Poses
 __all__ = ["RestShape", "cut_to_digits", "rest_in_pose"]
 
 _LEAST = 0.05
-"""Scaled Jacobian that carried elements must keep; skin nodes stay off the skin where it asks for worse."""
+"""Least scaled Jacobian of carried elements; skin nodes stay off the skin where following it would be worse."""
 
 _GOOD = 0.15
-"""Scaled Jacobian below which elements around are put in order."""
+"""Scaled Jacobian below which elements and those around them are untangled."""
 _NEAR = 0.03
-"""Distance of a skin node from the skin, in edges, from which on they are, too."""
+"""Distance of a skin node from the skin, in element edges, above which the elements around it are untangled as well."""
 _RINGS = 4
+"""Rings of elements around trouble that take part in untangling."""
 _PULLS = (3.0, 10.0, 30.0, 30.0)
-"""Weights of the distances of skin nodes from the skin, in edges squared, one after the other."""
+"""Weights of the squared distances of skin nodes from the skin (in element edges) in successive rounds."""
 _SLIDE = 0.05
+"""Weight of tangential displacement of skin nodes relative to that of their distance (``slide`` of ``improve``)."""
 _FIXED = 1e4
+"""Weight that keeps fixed nodes in place."""
 _SHORTER = 0.6
-"""Share of their way that nodes of elements which become too bad go instead."""
+"""Factor by which displacements of nodes of bad elements are shortened."""
 _YIELDS = 3
-"""How often nodes at the ends of bones are let go where the bones of a bent joint crush an element between them."""
+"""How often bone nodes are released whose bones crush an element between them at a bent joint."""
 _OWN = 0.5
-"""Share of its digits' bones from which on flesh belongs to a part of a hand."""
+"""Bone weight above which flesh belongs to the selected digits."""
 
 
 def rest_in_pose(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tuple[FleshHand, float]:
-    """The hand at rest in a pose.
+    """Carry a hand's mesh to a pose.
+
+    Bone nodes that would crush an element between two bones are released and become flesh nodes.
 
     Args:
-        hand: As built, at the rig's rest.
-        poses: One pose.
-        skin: Its surface in that pose as the covering gives it [m], shape (V, 3).
-
-    Nodes at the ends of bones that crush an element between them are let go, so that they are flesh's.
+        hand: Hand as built, at the rig's rest.
+        poses: The pose (a batch of one).
+        skin: Its surface in that pose as the covering deforms it [m], shape (V, 3).
 
     Returns:
-        The hand, whose ``moves`` still count from the rig's rest, and the greatest distance of its mesh's skin nodes
+        The hand, whose ``moves`` still count from the rig's rest, and the largest distance of its mesh's skin nodes
         from that surface [m].
 
     Raises:
-        InputError: The pose turns elements inside out.
+        InputError: The pose inverts elements.
     """
     moves = hand.moves(poses)
     mesh = hand.mesh
@@ -69,10 +74,10 @@ def rest_in_pose(hand: FleshHand, poses: Poses, skin: NDArray[np.float64]) -> tu
 
     surface = Facets(hand.surface.vertices, hand.surface.faces)
     outer = np.setdiff1d(np.unique(mesh.quads(hand.skin_faces)), bone)
-    found, place = surface.locate(mesh.nodes[outer])
-    offset = np.einsum("nij,nj->ni", surface.frames(place, surface.vertices), mesh.nodes[outer] - found.closest)
-    target = surface.at(place, skin) + np.einsum("nij,ni->nj", surface.frames(place, skin), offset)
-    change = _harmonic(mesh, outer, target - nodes[outer], bone)
+    known, fixed = np.zeros_like(nodes), np.zeros(len(nodes), dtype=bool)
+    known[outer] = surface.carried(mesh.nodes[outer], skin) - nodes[outer]
+    fixed[outer] = fixed[bone] = True
+    change = harmonic_field(mesh, known, fixed)
     moved = replace(mesh, nodes=nodes + change)
     least = min(_LEAST, 0.5 * float(mesh.scaled_jacobian().min()))
     if moved.scaled_jacobian().min() < least:
@@ -101,9 +106,9 @@ def _untangled(
     skin: Facets,
     least: float,
 ) -> HexMesh:
-    """The nodes moved by ``change`` (N, 3), where a fold asks for it by less; then put in order around the folds.
+    """Move nodes by ``change`` (N, 3), less where elements would fold, then untangle around the folds.
 
-    There skin nodes slide along the skin, and those inside go where elements are well shaped; all others stay.
+    In the untangled region skin nodes slide along the skin and inner nodes improve element quality; all others stay.
     """
     moved = as_far(mesh, mesh.nodes, mesh.nodes + change, least, _SHORTER)
     edge = float(np.median(np.linalg.norm(np.diff(mesh.nodes[mesh.elements[:, :2]], axis=1), axis=2)))
@@ -157,14 +162,14 @@ def _untangled(
 
 @dataclass(frozen=True, eq=False)
 class RestShape:
-    """A hand, or those digits of it whose flesh is meshed.
+    """Reference configuration of a hand, or of those of its digits whose flesh is meshed.
 
     Attributes:
-        hand: With the nodes, faces and bones that are left; every bone keeps its number, some have no nodes.
-        start: Motions of the bones, from the rig's rest, at time 0.
-        cut: Nodes where the rest was cut off; they follow the bones.
-        blend: Share of the meshed flesh in every vertex of the rig's surface, shape (V,): 0 where there is none.
-        skin: The rig's surface at time 0 [m], shape (V, 3).
+        hand: Hand with the remaining nodes, faces and bones; bones keep their numbers, some have no nodes.
+        start: Rigid motions of the bones from the rig's rest to time 0.
+        cut: Nodes on the cut surface, which follow the bones.
+        blend: Weight of the meshed flesh at every vertex of the rig's surface, 0 … 1, shape (V,); 0 without flesh.
+        skin: Surface of the rig at time 0 [m], shape (V, 3).
     """
 
     hand: FleshHand
@@ -174,8 +179,8 @@ class RestShape:
     skin: NDArray[np.float64]
 
     def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The rig's surface [m], shape (V, 3): displaced by the flesh (N, 3) where it is meshed, as the covering has it
-        (V, 3) elsewhere."""
+        """Surface of the rig [m], shape (V, 3): displaced with the flesh (N, 3) where it is meshed, ``covered`` (V, 3)
+        elsewhere, blended in between."""
         inside = self.blend > 0.0
         out = np.array(covered, dtype=np.float64)
         embedding = self.hand.flesh.skin
@@ -188,14 +193,14 @@ class RestShape:
 
 
 def cut_to_digits(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Sequence[str] = ()) -> RestShape:
-    """A posed hand (see ``rest_in_pose``) or some digits of it.
+    """Restrict a posed hand (see ``rest_in_pose``) to some digits.
 
     Args:
-        hand: At rest in ``poses``.
+        hand: Hand carried to ``poses``.
         poses: That pose.
-        skin: Its surface there [m], shape (V, 3).
-        digits: Their names, as ``index``, or ``palm``; none for the whole hand. The thumb comes with its ball, the
-            thenar, which lies on what it grasps.
+        skin: Its surface in that pose [m], shape (V, 3).
+        digits: Names, as ``index``, or ``palm``; empty for the whole hand. The thumb includes its ball (thenar), which
+            touches what it grasps.
 
     Raises:
         InputError: No bone belongs to a digit.
@@ -246,29 +251,6 @@ def cut_to_digits(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digi
 
 
 def _digits(segment: str) -> set[str]:
-    """What a segment's flesh belongs to; that over the thumb's metacarpal, its ball, to the thumb and to the palm."""
+    """Digits that a segment's flesh belongs to; the thenar, over the thumb's metacarpal, to both thumb and palm."""
     *before, last = segment.split(".")
     return {*before, *({last} if before[-1:] == ["palm"] and last == "thumb" else ())}
-
-
-def _harmonic(
-    mesh: HexMesh, known: NDArray[np.integer], values: NDArray[np.float64], still: NDArray[np.integer]
-) -> NDArray[np.float64]:
-    """The smoothest field over the nodes with these values at ``known`` and zero at ``still``, shape (N, 3)."""
-    from scipy.sparse import coo_array, diags_array
-    from scipy.sparse.linalg import splu
-
-    count = len(mesh.nodes)
-    edges = mesh.edges()
-    stiff = 1.0 / np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)
-    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
-    links = coo_array((np.concatenate([stiff, stiff]), (rows, columns)), shape=(count, count)).tocsr()
-    out = np.zeros((count, 3))
-    out[known] = values
-    free = np.ones(count, dtype=bool)
-    free[known] = free[still] = False
-    if free.any():
-        laplacian = (diags_array(links.sum(axis=1)) - links).tocsr()
-        factor = splu(laplacian[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        out[free] = factor.solve(links[free][:, ~free] @ out[~free])
-    return out

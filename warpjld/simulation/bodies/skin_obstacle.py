@@ -1,4 +1,4 @@
-"""An actor whose flesh does not deform, as something that pushes and does not give way (R94, R126)."""
+"""Actor without simulated flesh as a prescribed obstacle (R94, R126)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["SkinObstacle", "bystanders"]
 
 
 class SkinObstacle(Obstacle):
-    """The surface of an actor as its covering has it; times are in frames from ``start``."""
+    """Surface of an actor deformed by its covering, as an obstacle; times are in frames from ``start``."""
 
     def __init__(self, actor: ActorAnimation, start: float) -> None:
         self._actor, self._start = actor, start
@@ -28,15 +28,10 @@ class SkinObstacle(Obstacle):
         return self._at(time).project(checked_points(points))
 
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """See `Obstacle.carried`; the offset from the nearest facet turns with it."""
+        """See `Obstacle.carried`; points move along with their nearest facets."""
         if time_from == time_to or not len(points):
             return checked_points(points)
-        facets = self._at(time_from)
-        found, place = facets.locate(checked_points(points))
-        before, after = facets.vertices, self._shape(time_to)
-        offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
-        turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
-        return np.asarray(facets.at(place, after) + turned)
+        return self._at(time_from).carried(checked_points(points), self._shape(time_to))
 
     def mesh(self, time: float) -> tuple[Points, Ints32]:
         """See `Obstacle.mesh`."""
@@ -55,13 +50,13 @@ class SkinObstacle(Obstacle):
 def bystanders(
     actors: dict[str, ActorAnimation], fleshed: set[str], frames: list[float], free: bool, start: float
 ) -> dict[str, Obstacle]:
-    """Actors without flesh that may come to touch something, as obstacles by name.
+    """Obstacles by name for actors without flesh that may come into contact.
 
     Args:
-        actors: All of them.
-        fleshed: Names of those whose flesh deforms.
-        frames: At which they are looked at.
-        free: Whether objects deform, which may go anywhere.
+        actors: All actors by name.
+        fleshed: Names of those with deformable flesh.
+        frames: Frames at which bounding boxes are compared.
+        free: Whether there are deformable objects; these may go anywhere, so all actors count.
         start: Frame of time 0.
     """
     out: dict[str, Obstacle] = {}
@@ -72,7 +67,7 @@ def bystanders(
 
 
 def _meets(one: ActorAnimation, other: ActorAnimation, frames: list[float]) -> bool:
-    """Whether boxes around two actors, in all their places at frames, meet."""
+    """Whether the bounding boxes of two actors over all frames overlap."""
     boxes = []
     for actor in (one, other):
         skins = [actor.skin(frame) for frame in frames]

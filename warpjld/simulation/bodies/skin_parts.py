@@ -1,4 +1,4 @@
-"""Digits and palm of a visible skin, each as a closed surface, to see where they overlap (R126, R127)."""
+"""Digits and palm of a visible skin as closed surfaces, for overlap tests between them (R126, R127)."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["SkinPart", "SkinParts", "digit_of_label", "skin_parts"]
 
 @dataclass(frozen=True, eq=False)
 class SkinPart:
-    """One digit, or the palm.
+    """Skin of one digit or of the palm.
 
     Attributes:
         name: ``thumb``, …, ``palm``.
-        vertices: Its own, shape (v,).
-        faces: Triangles over the vertices of the skin and, beyond them, the middles of the loops that it ends at,
-            shape (t, 3).
-        loops: Vertices of each of these loops.
+        vertices: Its vertices, as indices into the skin, shape (v,).
+        faces: Triangles of the closed part, shape (t, 3); indices beyond the skin's vertices are the centres of the
+            boundary loops, which close it.
+        loops: Vertices of each boundary loop.
     """
 
     name: str
@@ -33,20 +33,20 @@ class SkinPart:
     loops: tuple[NDArray[np.int32], ...]
 
     def surface(self, at: NDArray[np.float64]) -> Facets:
-        """It, closed, with the skin's vertices there (V, 3) [m]."""
+        """The closed surface for skin vertices (V, 3) [m]."""
         middles = [at[loop].mean(axis=0, keepdims=True) for loop in self.loops]
         return Facets(np.concatenate([at, *middles]), self.faces)
 
 
 @dataclass(frozen=True, eq=False)
 class SkinParts:
-    """All parts of a skin.
+    """Partition of a skin into digits and palm.
 
     Attributes:
-        labels: What part of the skin a vertex belongs to, shape (V,).
-        never: Pairs of labels that do not meet: neighbours, and what touches at rest, shape (L, L).
-        part_of: Part of every label: an index into ``names``, shape (L,).
-        names: Of the parts.
+        labels: Label (bone segment) of each vertex, shape (V,).
+        never: Pairs of labels that are not tested: neighbours, and labels that touch at rest, shape (L, L).
+        part_of: Part of every label, an index into ``names``, shape (L,).
+        names: Names of the parts.
         faces: Triangles of the skin, shape (T, 3).
     """
 
@@ -58,9 +58,9 @@ class SkinParts:
 
     @cached_property
     def parts(self) -> tuple[SkinPart, ...]:
-        """Those that there are."""
+        """All parts that have faces."""
         part = self.part_of[self.labels]
-        of_face = part[self.faces].max(axis=1)  # the palm is last: it takes the faces between
+        of_face = part[self.faces].max(axis=1)  # faces between two parts go to the last one: the palm, if it is one
         out = []
         for number, name in enumerate(self.names):
             mine = np.flatnonzero(part == number)
@@ -72,23 +72,23 @@ class SkinParts:
         return tuple(out)
 
     def mask(self, name: str) -> NDArray[np.bool_]:
-        """Vertices of a part, shape (V,)."""
+        """Mask of the vertices of a part, shape (V,)."""
         return np.asarray(self.part_of[self.labels] == self.names.index(name))
 
     def name_of(self, vertices: NDArray[np.integer]) -> list[str]:
-        """Names of the parts that vertices belong to, the largest share first."""
+        """Names of the parts that vertices belong to, by descending number of vertices."""
         count = np.bincount(self.part_of[self.labels[vertices]], minlength=len(self.names))
         return [self.names[k] for k in np.argsort(-count, kind="stable") if count[k]]
 
     def meet(self, vertices: NDArray[np.integer], corner: NDArray[np.integer]) -> NDArray[np.bool_]:
-        """Whether vertices may meet the skin that other vertices belong to; nothing meets the middle of a loop."""
+        """Whether contact between vertices and given corners of facets is possible; never with the centre of a loop."""
         real = corner < len(self.labels)
         other = self.labels[np.where(real, corner, 0)]
         return np.asarray(real & ~self.never[self.labels[vertices], other])
 
 
 def skin_parts(hand: FleshHand) -> SkinParts:
-    """Parts of the skin of a whole hand as it is built: at the rig's rest, where digits are apart."""
+    """Partition of the skin of a whole hand at the rig's rest, where digits are apart."""
     from scipy.spatial import cKDTree
 
     middle = hand.mesh.nodes[hand.mesh.quads(hand.skin_faces)].mean(axis=1)
@@ -106,7 +106,7 @@ def digit_of_label(label: str) -> str:
 
 
 def _loops(faces: NDArray[np.int32]) -> list[NDArray[np.int32]]:
-    """Vertices along the open edges of triangles, loop by loop, in the direction of the triangles."""
+    """Boundary loops of a triangulation as vertex sequences, oriented as in the triangles."""
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     _, first, times = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     following = {int(a): int(b) for a, b in edges[first[times == 1]]}
@@ -123,5 +123,5 @@ def _loops(faces: NDArray[np.int32]) -> list[NDArray[np.int32]]:
 
 
 def _cap(loop: NDArray[np.int32], middle: int) -> NDArray[np.int32]:
-    """Triangles that close a loop around a vertex in its middle."""
+    """Triangle fan that closes a loop around a central vertex, shape (n, 3)."""
     return np.stack([np.roll(loop, -1), loop, np.full(len(loop), middle)], axis=1).astype(np.int32)

@@ -1,9 +1,9 @@
-"""What an object stands on until a hand has taken its weight (R123, R128).
+"""Support of an object until a hand has taken its weight (R123, R128).
 
-The points it stands on hold it while the hand closes. Then they let go: their forces fade, and one point in the
-object's middle keeps its height, and nothing else, and so takes over what the hand does not bear yet. That point is
-lowered until no force is left on it: the hand alone holds the object, in an equilibrium that was reached with the
-descent under control, which finds it also where friction is almost used up.
+Support points hold the object while the hand closes. On release their reactions are ramped down, while the height of
+one central node (the handle) is prescribed and takes the part of the weight that the hand does not bear yet. The handle
+is lowered until its reaction vanishes: then the hand alone holds the object. This displacement control reaches the
+equilibrium also where friction is almost exhausted.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from warpjld.simulation.bodies.deformable_body import Bearing
 __all__ = ["ObjectSupport", "handle_of"]
 
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
+"""No Dirichlet conditions."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectSupport:
-    """An object's support over time.
+    """Support of an object and its release over time.
 
     Attributes:
-        handle: Node in the object's middle.
-        axis: Of the weight: 0, 1 or 2.
-        begins: Time until which the object stands; infinite: for ever.
-        bare: Time at which its points hold it no more.
-        free: Time from which on it is free.
+        handle: Central node of the object.
+        axis: Axis of gravity: 0, 1 or 2.
+        begins: Time at which the release begins; infinite: never.
+        bare: Time at which the reactions of the support points have faded to zero.
+        free: Time from which on the handle is free as well.
         lowered: Displacement of the handle along the axis from ``bare`` to ``free`` [m].
     """
 
@@ -42,11 +43,11 @@ class ObjectSupport:
     lowered: float = 0.0
 
     def stands(self, time: float) -> bool:
-        """Whether its points hold the object."""
+        """Whether the support points still hold the object."""
         return time <= self.begins + 1e-9
 
     def prescribed(self, time: float, bearing: Bearing | None) -> Prescribed:
-        """Displacement of the handle, while it holds anything."""
+        """Prescribed height of the handle during the release; empty before and after."""
         if self.stands(time) or time >= self.free - 1e-9:
             return _NOTHING
         down = self.lowered * max(0.0, (time - self.bare) / (self.free - self.bare))
@@ -54,22 +55,22 @@ class ObjectSupport:
         return Prescribed(np.array([3 * self.handle + self.axis]), np.array([height + down]))
 
     def fading(self, time: float, bearing: Bearing | None) -> NDArray[np.float64] | None:
-        """What is left of the forces of its points [N], shape (N, 3)."""
+        """Remaining forces of the support points during the release [N], shape (N, 3); None before and after."""
         if bearing is None or self.stands(time) or time >= self.bare:
             return None
         return (self.bare - time) / (self.bare - self.begins) * bearing.forces
 
     def released(self, begins: float, free: float, lowered: float) -> ObjectSupport:
-        """The same, letting go from one time to another, while the object's middle sinks so far [m]."""
+        """A copy with a release between two times, during which the handle moves by ``lowered`` [m]."""
         return replace(self, begins=begins, free=free, lowered=lowered, bare=0.5 * (begins + free))
 
     def bearing(self, time: float, displacement: NDArray[np.float64], reactions: NDArray[np.float64]) -> Bearing | None:
-        """What it bears, from the object's rows (N, 3), at the moment it begins to let go; None at others."""
+        """Support reactions, from the object's rows (N, 3), at the time the release begins; None at other times."""
         if abs(time - self.begins) >= 1e-9:
             return None
         return Bearing(reactions.copy(), float(displacement[self.handle, self.axis]))
 
 
 def handle_of(nodes: NDArray[np.float64]) -> int:
-    """The node nearest to the middle of all (N, 3): the weight acts there."""
+    """Index of the node nearest to the mean of all nodes (N, 3)."""
     return int(np.argmin(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1)))

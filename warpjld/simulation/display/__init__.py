@@ -1,1 +1,1 @@
-"""What is seen: visible surfaces carried by bodies, parted where they overlap, with pressure on them."""
+"""Display: visible surfaces embedded in the bodies, separated where they overlap, with pressure maps."""

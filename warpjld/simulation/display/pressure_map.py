@@ -1,4 +1,4 @@
-"""Contact forces of nodes as pressure on a visible surface, with the sum they have (R95)."""
+"""Conservative mapping of nodal contact forces to pressure on a visible surface (R95)."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 __all__ = ["PressureMap", "pressure_map"]
 
 _SEEN = 0.5
-"""Share of the element faces around a node that its visible surface has at least: what presses on others, where a
-surface is coarser than elements or cut off, goes to the place nearest to them."""
+"""Least ratio of the visible area carried by a node to its tributary area; forces on nodes with less (where the surface
+is coarser than the elements or cut off) go to the closest point of the surface."""
 
 
 class PressureMap:
-    """Spreads what presses on a volume's outer nodes over the surface it carries.
+    """Distributes normal forces at a volume's outer nodes over the embedded surface.
 
-    A node's force is shared among the vertices it carries in proportion to their weights and areas: between nodes
-    pressures go straight from one to the next, and their integral is the force.
+    A node's force is distributed among the vertices it carries in proportion to their weights and areas: pressures are
+    interpolated linearly between nodes, and their integral equals the force.
 
     Args:
-        mesh: The volume, as it rests.
-        faces: Its face set.
-        carried: How it carries the vertices.
-        vertices: At the same moment [m], shape (V, 3).
-        triangles: Of the whole surface, shape (T, 3).
-        embedded: Vertices that the volume carries, shape (V,).
+        mesh: The volume in its reference configuration.
+        faces: Name of its face set.
+        carried: Embedding of the vertices.
+        vertices: Vertices in the same configuration [m], shape (V, 3).
+        triangles: Triangles of the whole surface, shape (T, 3).
+        embedded: Mask of the vertices that the volume carries, shape (V,).
     """
 
     def __init__(
@@ -68,7 +68,8 @@ class PressureMap:
             self._nearest = csr_array((place.weights.ravel(), corners.ravel(), columns), shape=shape).T
 
     def of(self, force: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Pressure at the vertices, where they are now (V, 3) [Pa], shape (V,), of forces on the nodes (N,) [N]."""
+        """Pressure at the vertices [Pa], shape (V,), from normal forces on the nodes (N,) [N] and current vertices
+        (V, 3) [m]."""
         area = self._areas(vertices)
         out = self._table @ _over(force, self._table.T @ area)
         return np.asarray(out + _over(self._nearest @ force[self._bare], area), np.float64)
@@ -81,11 +82,11 @@ class PressureMap:
 
 
 def pressure_map(body: DeformableBody, force: NDArray[np.float64]) -> tuple[RefinedSurface, PressureMap]:
-    """A body's surface split where nodes are pressed, about as fine as they are far apart or finer, and its map.
+    """A body's surface, refined where it is ever in contact, and its pressure map.
 
     Args:
-        body: At rest.
-        force: That ever presses on the nodes [N], shape (N,).
+        body: The body.
+        force: Largest normal force on the nodes over all frames [N], shape (N,).
     """
     triangles, carried, embedded = body.triangles, body.embedding, body.embedded
     count = len(body.surface)
@@ -102,4 +103,5 @@ def pressure_map(body: DeformableBody, force: NDArray[np.float64]) -> tuple[Refi
 
 
 def _over(force: NDArray[np.float64], area: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Force over area, 0 where the area is 0."""
     return np.divide(force, area, out=np.zeros(len(area)), where=area > 0.0)

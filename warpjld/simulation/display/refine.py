@@ -1,4 +1,4 @@
-"""Refined surfaces: some triangles are split in four, so that colours change within them."""
+"""Local refinement of triangulated surfaces (red–green), for colours that vary within triangles."""
 
 from __future__ import annotations
 
@@ -13,24 +13,29 @@ __all__ = ["RefinedSurface", "refine_surface"]
 
 @dataclass(frozen=True, eq=False)
 class RefinedSurface:
-    """The vertices of a surface, and behind them the middles of some edges.
+    """A refined surface: the vertices of the original one, followed by midpoints of edges.
 
     Attributes:
-        faces: Triangles over both, shape (T, 3).
-        edges: Ends of the edges with a middle, shape (M, 2).
+        faces: Triangles, shape (T, 3).
+        edges: End vertices of the split edges, shape (M, 2).
     """
 
     faces: NDArray[np.int32]
     edges: NDArray[np.int32]
 
     def of(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Positions, or other values, of all of them (V + M, …) from those of the surface's vertices (V, …)."""
+        """Values at all vertices (V + M, …) from those at the original ones (V, …), as positions."""
         return np.concatenate([values, 0.5 * (values[self.edges[:, 0]] + values[self.edges[:, 1]])], dtype=np.float64)
 
 
 def refine_surface(faces: NDArray[np.integer], chosen: NDArray[np.bool_], count: int) -> RefinedSurface:
-    """Split triangles (T, 3) over ``count`` vertices in four where they are chosen (T,), and those beside them in two
-    or three: edges have a middle on both sides or on neither."""
+    """Split chosen triangles into four, and their neighbours into two or three so that no hanging vertices remain.
+
+    Args:
+        faces: Triangles, shape (T, 3).
+        chosen: Mask of the triangles to split, shape (T,).
+        count: Number of vertices.
+    """
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
     key = (sides @ [count, 1]).reshape(-1, 3)
     split = np.unique(key[chosen])
@@ -49,5 +54,6 @@ def refine_surface(faces: NDArray[np.integer], chosen: NDArray[np.bool_], count:
     return RefinedSurface(np.concatenate(parts).astype(np.int32), edges.astype(np.int32))
 
 
-def _triangles(some: Any, *corners: tuple[NDArray[np.integer], ...]) -> list[NDArray[np.integer]]:
-    return [np.stack(three, axis=1)[some] for three in corners]
+def _triangles(mask: Any, *corners: tuple[NDArray[np.integer], ...]) -> list[NDArray[np.integer]]:
+    """Triangles from columns of corners, restricted to masked rows."""
+    return [np.stack(three, axis=1)[mask] for three in corners]

@@ -1,4 +1,4 @@
-"""Fields on visible surfaces without the kinks of elements: between elements gradients jump, and the eye sees it."""
+"""Smoothing of fields on visible surfaces, which hides the gradient jumps at element boundaries."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 __all__ = ["SurfaceSmoother"]
 
 _LENGTH = 1.0
-"""How far values spread, in edges of elements."""
+"""Smoothing length, in element edges."""
 _MOST = 12
+"""Most smoothing steps."""
 
 
 class SurfaceSmoother:
-    """Averages over neighbouring vertices, as often as it takes to spread over an element.
+    """Umbrella (mean over neighbours) smoothing over about one element edge.
 
     Args:
         vertices: [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        edge: Of the elements [m]. A surface that is coarser than they are is left alone.
+        edge: Element edge [m]; a surface coarser than the elements is not smoothed.
     """
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.integer], edge: float) -> None:
@@ -28,7 +29,7 @@ class SurfaceSmoother:
 
         ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         length = float(np.median(np.linalg.norm(vertices[ends[:, 1]] - vertices[ends[:, 0]], axis=1)))
-        # a step of (1 + mean) / 2 spreads by half an edge squared
+        # the variance of a step (1 + mean) / 2 is half an edge squared
         self.steps = min(_MOST, int(2.0 * (_LENGTH * edge / max(length, 1e-300)) ** 2))
         count = len(vertices)
         table = csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
@@ -36,7 +37,7 @@ class SurfaceSmoother:
         self._mean: Any = diags_array(1.0 / np.maximum(links.sum(axis=1), 1.0)) @ links
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Smoother values of vertices, shape (V,) or (V, n)."""
+        """Smoothed values at the vertices, shape (V,) or (V, n)."""
         for _ in range(self.steps):
             values = 0.5 * (values + self._mean @ values)
         return values

@@ -1,4 +1,4 @@
-"""Skin and objects as contact deforms them, at any frame (R104)."""
+"""Visible surfaces of hands and objects deformed by contact, at any frame (R104)."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame
 __all__ = ["DeformedSurfaces"]
 
 _SUNKEN = 0.5
-"""How deep in one another visible surfaces may come to be shown apart, in edges of elements."""
+"""Largest displacement of the display correction, in element edges."""
 _KEPT = 64
-"""Frames whose surfaces are kept: exports, films and objects ask for the same ones in turn."""
+"""Frames whose surfaces are cached, as exports, films and objects ask for the same ones in turn."""
 
 
 @dataclass(frozen=True, eq=False)
 class DeformedSurfaces:
-    """What a contact solve makes of the visible surfaces.
+    """Visible surfaces after a contact solve.
 
     Attributes:
-        model: What was pressed.
-        frames: Those that were solved, in order.
-        covered: An actor's surface at a frame as the covering has it [m], shape (V, 3).
-        pushed: Objects that were pushed about before: frames and placements, by name.
-        shapes: Their vertices in their own frame [m].
+        model: The contact model.
+        frames: Solved frames in order.
+        covered: Surface of an actor at a frame as the covering deforms it [m], shape (V, 3).
+        pushed: Objects that moved rigidly (pushed or falling) outside the contact solve: frames and placements, by
+            name.
+        shapes: Vertices of these in their own frame [m], by name.
     """
 
     model: ContactModel
@@ -49,40 +50,40 @@ class DeformedSurfaces:
     )
 
     def moves(self, name: str) -> bool:
-        """Whether an object is shown as contact has it, or as it falls."""
+        """Whether an object's surface comes from the contact solve or a rigid motion before or after it."""
         return name in self.pushed or (any(one.name == name for one in self.model.objects) and len(self.frames) > 0)
 
     def skin(self, actor: str, frame: float) -> NDArray[np.float64] | None:
-        """An actor's surface (V, 3) at a frame; None where contact was not solved."""
+        """Surface of an actor at a frame [m], shape (V, 3); None outside the solved frames."""
         if not any(hand.name == actor for hand in self.model.hands) or self._displacement(frame) is None:
             return None
         return self.separated(frame).vertices[actor]
 
     def object(self, name: str, frame: float) -> NDArray[np.float64] | None:
-        """An object's surface (V, 3) at a frame; None where contact was not solved."""
+        """Surface of an object at a frame [m], shape (V, 3); None outside the solved frames and rigid motions."""
         if any(one.name == name for one in self.model.objects) and self._displacement(frame) is not None:
             return self.separated(frame).vertices[name]
         frames, places = self.pushed.get(name, (np.empty(0), ()))
         if not len(frames) or frame < frames[0]:
             return None
-        k = min(int(np.searchsorted(frames, frame - 1e-9)), len(frames) - 1)  # what has fallen stays there
+        k = min(int(np.searchsorted(frames, frame - 1e-9)), len(frames) - 1)  # after the last frame it stays there
         return np.asarray(places[k].apply(self.shapes[name])[0])
 
     def refined(self, name: str, faces: NDArray[np.int32], count: int) -> RefinedSurface:
-        """An actor's or object's surface, with triangles split where anything ever presses on them.
+        """Surface of an actor or object, refined where it is ever in contact.
 
         Args:
-            name: Of the actor or object.
+            name: Name of the actor or object.
             faces: Its triangles, shape (T, 3).
-            count: Its vertices.
+            count: Number of its vertices.
         """
         if name in self._maps:
             return self._maps[name][0]
         return refine_surface(faces, np.zeros(len(faces), dtype=bool), count)
 
     def pressure(self, name: str, frame: float) -> NDArray[np.float64] | None:
-        """Contact pressure on an actor or object [Pa], at the vertices of its refined surface, shape (V,); None where
-        there is none. Its integral over the surface is the force that presses."""
+        """Contact pressure at the vertices of the refined surface of an actor or object [Pa], shape (V,); None if not
+        known. Its integral over the surface is the normal force."""
         whole = self._between(self._forces, frame)
         if name not in self._maps or whole is None:
             return None
@@ -90,15 +91,15 @@ class DeformedSurfaces:
         return spread.of(whole[self.model.spans[name]], surface.of(self.separated(frame).vertices[name]))
 
     def carried(self, frame: float) -> dict[str, VisibleSurface]:
-        """Visible surfaces at a frame that was solved, or between two, as bodies carry them, by name."""
+        """Visible surfaces at a frame as embedded in the bodies, before the display correction, by name."""
         return self._surfaces(frame)[0]
 
     def separated(self, frame: float) -> SeparatedSurfaces:
-        """The same without overlap."""
+        """Visible surfaces at a frame after the display correction."""
         return self._surfaces(frame)[1]
 
     def most(self, name: str) -> float:
-        """How far vertices of a surface may be moved to be shown apart from others [m]."""
+        """Largest displacement of a surface's vertices by the display correction [m]."""
         body = self.model.named(name)
         return _SUNKEN * element_edge(body.mesh, body.faces)
 
@@ -114,7 +115,7 @@ class DeformedSurfaces:
         return self._latest[frame]
 
     def _visible(self, frame: float, moved: NDArray[np.float64]) -> dict[str, VisibleSurface]:
-        """Surfaces under a displacement of all nodes (N, 3); what flesh does to skin is smoothed."""
+        """Embedded surfaces under a displacement of all nodes (N, 3); the change of skin by flesh is smoothed."""
         skins = {hand.name: np.asarray(self.covered(hand.name, frame), dtype=np.float64) for hand in self.model.hands}
         out = {}
         for body in self.model.bodies:
@@ -127,13 +128,13 @@ class DeformedSurfaces:
 
     @cached_property
     def high(self) -> float:
-        """Highest pressure at any node and any frame that was solved [Pa]: as the table has it, and no more than what
-        crushes flesh, so that what one digit is crushed with does not blank all others."""
+        """Top of the colour scale [Pa]: highest nodal pressure of all frames, as in the table, but at most the crushing
+        pressure, so that one crushed digit does not wash out all others."""
         return min(CRUSHING, max((float(frame.pressure(self.model).max()) for frame in self.frames), default=0.0))
 
     @cached_property
     def _maps(self) -> dict[str, tuple[RefinedSurface, PressureMap]]:
-        """Refined surfaces, and how forces on nodes are spread over them, by name; none where nothing was solved."""
+        """Refined surfaces and pressure maps by name; empty if no frame was solved."""
         if not self.frames:
             return {}
         force = self._forces.max(axis=0)
@@ -141,7 +142,7 @@ class DeformedSurfaces:
 
     @cached_property
     def _smoothers(self) -> dict[str, SurfaceSmoother]:
-        """Of the actors' surfaces, by name."""
+        """Smoothers of the actors' surfaces by name."""
         return {
             hand.name: SurfaceSmoother(hand.surface, hand.triangles, element_edge(hand.mesh, hand.faces))
             for hand in self.model.hands
@@ -149,20 +150,20 @@ class DeformedSurfaces:
 
     @cached_property
     def _forces(self) -> NDArray[np.float64]:
-        """What presses on the nodes, at the start and at the frames that were solved [N]."""
-        nothing = np.zeros((1, len(self.model.body.mesh.nodes)))
-        return np.concatenate([nothing, *(f.nodal_contact.force.sum(axis=0)[None] for f in self.frames)])
+        """Normal forces on the nodes at the start (zero) and at the solved frames [N], shape (1 + F, N)."""
+        unloaded = np.zeros((1, len(self.model.body.mesh.nodes)))
+        return np.concatenate([unloaded, *(f.nodal_contact.force.sum(axis=0)[None] for f in self.frames)])
 
     @cached_property
     def _displacements(self) -> NDArray[np.float64]:
-        nothing = np.zeros((1, len(self.model.body.mesh.nodes), 3))
-        return np.concatenate([nothing, *(f.displacement[None] for f in self.frames)])
+        at_rest = np.zeros((1, len(self.model.body.mesh.nodes), 3))
+        return np.concatenate([at_rest, *(f.displacement[None] for f in self.frames)])
 
     def _displacement(self, frame: float) -> NDArray[np.float64] | None:
         return self._between(self._displacements, frame)
 
     def _between(self, values: NDArray[np.float64], frame: float) -> NDArray[np.float64] | None:
-        """Values at a frame: straight between two that were solved, None outside."""
+        """Values at a frame, linear between solved frames; None outside them."""
         times = np.array([self.model.start, *(one.frame for one in self.frames)])
         if not times[0] <= frame <= times[-1] or len(times) == 1:
             return None

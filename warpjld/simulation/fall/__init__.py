@@ -1,1 +1,1 @@
-"""Objects that nothing holds, as rigid bodies that fall, slide, roll and come to rest."""
+"""Rigid-body dynamics of unsupported objects: falling, sliding, rolling, coming to rest."""

@@ -1,4 +1,4 @@
-"""Where rigid bodies touch each other and obstacles, a few points for every side that does."""
+"""Contact points of rigid bodies with each other and with obstacles, reduced to a few per contact plane."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from warpjld.simulation.fall.rigid_body import RigidBody
 __all__ = ["RigidContact", "contacts_with", "contacts_within"]
 
 _ALIKE = np.cos(np.radians(10.0))
-"""Points whose normals differ by less than this touch one side of something."""
+"""Cosine of the angle below which normals belong to the same contact plane."""
 _SIDES = 6
-"""Sides of one thing that another touches, at most."""
+"""Most contact planes between two bodies."""
 _DEEP = 3.0
-"""How far out a point must lie, over its gap, to be taken before a deeper one."""
+"""Weight of a point's gap against its lateral extent when the outermost points of a plane are selected."""
 _AROUND = 0.3 + np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
-"""Directions in which the outermost points of a side are looked for."""
+"""Directions in a contact plane in which the outermost points are selected [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class RigidContact:
-    """A point at which a body may touch something.
+    """A possible contact point of a body.
 
     Attributes:
-        body: Number of the body.
-        other: Number of the other body; -1: an obstacle.
-        point: [m], shape (3,).
+        body: Index of the body.
+        other: Index of the other body; -1 for an obstacle.
+        point: Position [m], shape (3,).
         normal: Unit normal towards the body, shape (3,).
-        gap: [m]; negative: overlap.
-        carried: Velocity of an obstacle's surface there [m/s], shape (3,); nothing for bodies.
+        gap: Signed distance [m]; negative: overlap.
+        carried: Velocity of the obstacle's surface there [m/s], shape (3,); 0 for bodies.
         friction: Coulomb's μ.
-        name: Of the other.
+        name: Name of the other body or obstacle.
     """
 
     body: int
@@ -49,10 +49,15 @@ class RigidContact:
     friction: float
     name: str
 
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """Normal and two tangents, orthonormal, shape (3, 3)."""
+        return np.concatenate([self.normal[None], np.linalg.svd(self.normal[None])[2][1:]])
+
 
 @dataclass(frozen=True, eq=False)
 class _Near:
-    """Points near something: where (n, 3), unit normals towards the body (n, 3), and gaps (n,)."""
+    """Candidate points [m] (n, 3), unit normals towards the body (n, 3), and gaps [m] (n,)."""
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
@@ -70,18 +75,18 @@ def contacts_with(
     friction: Callable[[str, str], float],
     shapes: Mapping[str, NDArray[np.float64]],
 ) -> list[RigidContact]:
-    """Where a body is nearer than a margin [m] to obstacles.
+    """Contact points of a body with obstacles that are closer than a margin.
 
     Args:
-        number: Of the body.
-        body: Itself.
-        obstacles: By name.
-        time: Theirs; ``step`` later they are elsewhere, after ``length`` seconds.
-        step: [frames].
-        length: [s].
-        margin: [m].
-        friction: Between two names.
-        shapes: Points of the obstacles' surfaces at the time [m], by name.
+        number: Index of the body.
+        body: The body.
+        obstacles: Obstacles by name.
+        time: Time at the begin of the step [frames].
+        step: Length of the step [frames].
+        length: The same [s].
+        margin: Largest gap considered [m].
+        friction: Coulomb's μ between two names.
+        shapes: Surface points of the obstacles at ``time`` [m], by name.
     """
     out = []
     for name, obstacle in obstacles.items():
@@ -101,7 +106,7 @@ def contacts_with(
 def contacts_within(
     bodies: Sequence[RigidBody], margin: float, friction: Callable[[str, str], float]
 ) -> list[RigidContact]:
-    """Where bodies are nearer than a margin [m] to each other."""
+    """Contact points between bodies that are closer than a margin [m]."""
     out = []
     for k, one in enumerate(bodies):
         for m in range(k + 1, len(bodies)):
@@ -124,7 +129,7 @@ def _projected(obstacle: Obstacle, time: float, points: NDArray[np.float64]) -> 
 
 
 def _near(body: RigidBody, project: Callable[[NDArray[np.float64]], ClosestPoints], margin: float) -> _Near:
-    """Points of a body near to something."""
+    """Points of a body closer than a margin [m] to a surface, given its closest-point projection."""
     radius = body.shape.radius
     if float(project(body.centre[None]).distance[0]) > body.shape.reach + margin:
         nowhere = np.empty((0, 3))
@@ -134,8 +139,7 @@ def _near(body: RigidBody, project: Callable[[NDArray[np.float64]], ClosestPoint
     if not radius:
         near = found.distance < margin
         return _Near(points[near], found.normal[near], found.distance[near])
-    # a ball touches the plane through the nearest point of every side at the point below its middle, whatever facets
-    # it is drawn with
+    # a ball is exact: for every side, the contact point is below its centre on the plane through the closest point
     gaps = np.einsum("ni,ni->n", found.normal, body.middle - found.closest) - radius
     gaps[0] = found.distance[0] - radius
     near = (gaps < margin) & (found.distance < margin + np.append(radius, np.zeros(len(gaps) - 1)))
@@ -144,7 +148,7 @@ def _near(body: RigidBody, project: Callable[[NDArray[np.float64]], ClosestPoint
 
 
 def _reversed(body: RigidBody, shape: NDArray[np.float64], margin: float) -> _Near:
-    """Points (n, 3) of something near to a body."""
+    """Points of a surface (n, 3) [m] closer than a margin to a body."""
     close = shape[np.linalg.norm(shape - body.centre, axis=1) < body.shape.reach + margin]
     if not len(close):
         return _Near(close, close, np.empty(0))
@@ -156,7 +160,7 @@ def _reversed(body: RigidBody, shape: NDArray[np.float64], margin: float) -> _Ne
 def _sides(
     sets: Sequence[_Near],
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
-    """A few points (k, 3) of each side with their normals and gaps: the deepest, and the outermost ones around it."""
+    """Points (k, 3), normals and gaps of each contact plane, reduced to the deepest point and the outermost ones."""
     points = np.concatenate([one.points for one in sets])
     normals = np.concatenate([one.normals for one in sets])
     gaps = np.concatenate([one.gaps for one in sets])
@@ -171,8 +175,8 @@ def _sides(
         left[side] = False
         across = np.linalg.svd(normals[deepest][None])[2][1:]
         flat = points[side] @ across.T
-        ways = np.stack([np.cos(_AROUND), np.sin(_AROUND)])
-        outer = flat @ ways - _DEEP * (gaps[side] - gaps[deepest])[:, None]
+        directions = np.stack([np.cos(_AROUND), np.sin(_AROUND)])
+        outer = flat @ directions - _DEEP * (gaps[side] - gaps[deepest])[:, None]
         chosen = np.unique([deepest, *side[np.argmax(outer, axis=0)]])
         out.append((points[chosen], normals[chosen], gaps[chosen]))
     return out

@@ -1,4 +1,4 @@
-"""Impulses at contacts of rigid bodies in a time step: Signorini's and Coulomb's laws at its end.
+"""Contact impulses of rigid bodies in a time step by Signorini's and Coulomb's laws (Moreau time stepping).
 
 Moreau's time stepping (J. J. Moreau 1988, Unilateral contact and dry friction in finite freedom dynamics; M. Jean 1999,
 The non-smooth contact dynamics method, Comput. Methods Appl. Mech. Eng. 177, 235–257) without restitution: with u the
@@ -24,15 +24,16 @@ from warpjld.simulation.fall.rigid_body import RigidBody
 __all__ = ["impulses", "jacobian"]
 
 _SWEEPS = 100
+"""Most Gauss–Seidel sweeps."""
 _EXACT = 1e-6
-"""Change of impulses over the largest of them that ends the sweeps."""
+"""Convergence tolerance: change of impulses in a sweep relative to the largest."""
 
 
 def jacobian(bodies: Sequence[RigidBody], contacts: Sequence[RigidContact]) -> NDArray[np.float64]:
-    """Relative velocity of contacts by velocities and spins of bodies, shape (3C, 6B): normal, and two tangents."""
+    """Relative contact velocities (normal and two tangents) by velocities and spins of bodies, shape (3C, 6B)."""
     out = np.zeros((3 * len(contacts), 6 * len(bodies)))
     for k, one in enumerate(contacts):
-        axes = np.concatenate([one.normal[None], np.linalg.svd(one.normal[None])[2][1:]])
+        axes = one.axes
         for number, sign in ((one.body, 1.0), (one.other, -1.0)):
             if number >= 0:
                 arm = one.point - bodies[number].centre
@@ -44,12 +45,12 @@ def jacobian(bodies: Sequence[RigidBody], contacts: Sequence[RigidContact]) -> N
 def impulses(
     delassus: NDArray[np.float64], free: NDArray[np.float64], bounds: NDArray[np.float64], friction: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Impulses (3C,) [N s] of C contacts.
+    """Impulses of C contacts by projected Gauss–Seidel [N s], shape (3C,): normal and two tangents of each.
 
     Args:
-        delassus: Relative velocities by impulses [1/kg], shape (3C, 3C).
-        free: Relative velocities without any [m/s], shape (3C,).
-        bounds: g/h: how fast each may close [m/s], shape (C,).
+        delassus: Delassus operator: relative velocities by impulses [1/kg], shape (3C, 3C).
+        free: Relative velocities without contact impulses [m/s], shape (3C,).
+        bounds: g/h: largest closing velocity of each contact [m/s], shape (C,).
         friction: Coulomb's μ, shape (C,).
     """
     out = np.zeros(len(free))

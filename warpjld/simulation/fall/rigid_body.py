@@ -1,4 +1,4 @@
-"""An object as a rigid body: its mass, what of it may touch, where it is and how it moves (B §3.4)."""
+"""Rigid bodies: mass properties, contact points, placement and velocity (B §3.4)."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from warpjld.simulation.specification import ObjectMaterial
 __all__ = ["RigidBody", "RigidShape", "rigid_shape"]
 
 _ACROSS = 10.0
-"""Points across an object at which it may touch something."""
+"""Surface points across an object's largest extent that are tested for contact."""
 _MOST = 3000
-"""Of them at most, about."""
+"""Approximate largest number of such points."""
 _ON_BALL = 200
-"""Points on a ball, whose own place is exact: they only look for what is around it."""
+"""Number of points on a ball; contact of a ball is exact, they only find the surfaces around it."""
 
 
 @dataclass(frozen=True, eq=False)
 class RigidShape:
-    """What of an object does not change as it moves, in its own frame.
+    """Constant properties of a rigid object in its own frame.
 
     Attributes:
-        name: Of the object.
-        mass: [kg].
-        centre: Of its mass [m], shape (3,).
-        inertia: About that centre [kg m²], shape (3, 3).
-        points: Of its surface, dense enough to be what touches [m], shape (n, 3).
-        facets: Its surface.
-        middle: Of its extents [m], shape (3,).
-        reach: Its farthest point from the centre [m].
-        radius: Of a ball [m]; 0 for everything else.
+        name: Name of the object.
+        mass: Mass [kg].
+        centre: Centre of mass [m], shape (3,).
+        inertia: Inertia tensor about the centre of mass [kg m²], shape (3, 3).
+        points: Surface points tested for contact [m], shape (n, 3).
+        facets: Triangulated surface.
+        middle: Centre of the bounding box [m], shape (3,).
+        reach: Largest distance of the surface from the centre of mass [m].
+        radius: Radius of a ball [m]; 0 for other shapes.
     """
 
     name: str
@@ -51,7 +51,7 @@ class RigidShape:
 
 
 def rigid_shape(name: str, thing: GraspObject, physical: ObjectMaterial) -> RigidShape:
-    """Mass and surface of an object: solid, or a shell as thick as its wall."""
+    """Mass properties and surface of an object: solid, or a thin shell with the thickness of its wall."""
     import trimesh
 
     corners = thing.vertices[thing.faces]
@@ -84,7 +84,7 @@ def rigid_shape(name: str, thing: GraspObject, physical: ObjectMaterial) -> Rigi
 
 
 def _points(thing: GraspObject) -> NDArray[np.float64]:
-    """Vertices of a surface whose edges are a fraction of it at most (n, 3) [m]."""
+    """Points on a surface (n, 3) [m]: a Fibonacci lattice on a ball, else vertices after subdivision of long edges."""
     import trimesh
 
     if thing.origin == "ball":
@@ -105,19 +105,19 @@ def _points(thing: GraspObject) -> NDArray[np.float64]:
 
 
 class RigidBody:
-    """A rigid shape that moves.
+    """State of a moving rigid body.
 
     Args:
-        shape: What it is.
-        place: Where it is: one placement.
+        shape: Constant properties.
+        place: Initial placement (a batch of one).
 
     Attributes:
-        shape: What it is.
-        centre: Of its mass [m], shape (3,).
-        turn: Rotation matrix from its own frame, shape (3, 3).
-        velocity: Of the centre [m/s], shape (3,).
+        shape: Constant properties.
+        centre: Centre of mass in world coordinates [m], shape (3,).
+        turn: Rotation matrix from its own frame to the world, shape (3, 3).
+        velocity: Velocity of the centre of mass [m/s], shape (3,).
         spin: Angular velocity [rad/s], shape (3,).
-        touching: Names of what it touches.
+        touching: Names of the bodies and obstacles that press on it.
     """
 
     def __init__(self, shape: RigidShape, place: Places) -> None:
@@ -130,36 +130,36 @@ class RigidBody:
 
     @property
     def place(self) -> Places:
-        """Where it is."""
+        """Placement of its own frame."""
         position = self.centre - self.turn @ self.shape.centre
         return Places(position[None], Rotation.from_matrix(self.turn).as_quat()[None])
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Where the points are that may touch (n, 3) [m]."""
+        """Surface points tested for contact, in world coordinates (n, 3) [m]."""
         return self.stage(self.shape.points)
 
     @property
     def middle(self) -> NDArray[np.float64]:
-        """Where the middle of its extents is [m], shape (3,)."""
+        """Centre of its bounding box in world coordinates [m], shape (3,)."""
         return self.stage(self.shape.middle[None])[0]
 
     @property
     def speed(self) -> float:
-        """Of its fastest point, or more [m/s]."""
+        """Upper bound on the speed of its points [m/s]."""
         return float(np.linalg.norm(self.velocity) + self.shape.reach * np.linalg.norm(self.spin))
 
     @property
     def inverse(self) -> NDArray[np.float64]:
-        """Of its inertia, on the stage [1/(kg m²)], shape (3, 3)."""
+        """Inverse inertia tensor in world coordinates [1/(kg m²)], shape (3, 3)."""
         return np.asarray(self.turn @ np.linalg.inv(self.shape.inertia) @ self.turn.T)
 
     def stage(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 3) of its own frame on the stage [m]."""
+        """Points (n, 3) of its own frame in world coordinates [m]."""
         return np.asarray((points - self.shape.centre) @ self.turn.T + self.centre)
 
     def project(self, points: NDArray[np.float64]) -> ClosestPoints:
-        """Nearest points of its surface to points (n, 3) of the stage [m]."""
+        """Closest-point projection of points (n, 3) in world coordinates [m] onto its surface."""
         if self.shape.radius:
             away = points - self.middle
             far = np.linalg.norm(away, axis=1)
@@ -169,11 +169,11 @@ class RigidBody:
         return ClosestPoints(found.distance, self.stage(found.closest), found.normal @ self.turn.T)
 
     def moving(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Velocities (n, 3) [m/s] of what of it is at points (n, 3)."""
+        """Velocities (n, 3) [m/s] of the body at points (n, 3) in world coordinates."""
         return np.asarray(self.velocity + np.cross(self.spin, points - self.centre))
 
     def energy(self, gravity: NDArray[np.float64]) -> float:
-        """Of motion and of height [J], with the acceleration ``gravity`` (3,) [m/s²]."""
+        """Kinetic plus potential energy [J] under the acceleration ``gravity`` (3,) [m/s²]."""
         inertia = self.turn @ self.shape.inertia @ self.turn.T
         motion = 0.5 * self.shape.mass * float(self.velocity @ self.velocity) + 0.5 * float(
             self.spin @ inertia @ self.spin

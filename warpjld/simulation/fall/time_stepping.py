@@ -1,8 +1,8 @@
-"""Rigid bodies through time: implicit Euler steps with contact and friction, without restitution.
+"""Time integration of rigid bodies with contact and friction, without restitution (semi-implicit Euler steps).
 
-In the air a body moves exactly as a parabola has it. What touches lands without bouncing, sticks or slides by Coulomb's
-law, and loses spin: rolling resistance α I ω, what flesh and rubber lose where they are rolled on. Nothing else is
-lost or gained: energy never rises unless what moves by its animation pushes.
+Without contact the centre of mass follows the exact parabola. In contact a body does not bounce, sticks or slides by
+Coulomb's law, and its spin is damped by a rolling resistance α I ω, which models losses of flesh and rubber. Energy
+never increases unless an animated obstacle pushes.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from warpjld.simulation.fall.rigid_body import RigidBody
 __all__ = ["ROLLING", "step_bodies", "steps_of"]
 
 ROLLING = 20.0
-"""α: share of its spin that a touching body loses in a second, about [1/s]."""
+"""Rolling resistance α: decay rate of the spin of a body in contact [1/s]."""
 
 _LONGEST = 1.0 / 240.0
-"""Length of a step at most [s]."""
+"""Longest time step [s]."""
 _NEAR = 1e-3
-"""Contacts are looked for nearer than this [m], and as far as bodies go in two steps."""
+"""Smallest search margin for contacts [m]; the distance that bodies move in two steps is added."""
 _PARTED = 0.2
-"""Share of an overlap that a step takes away."""
+"""Fraction of an overlap that is corrected per step."""
 _SLOP = 1e-5
-"""Gap at which bodies rest [m]: contact of deformable ones begins from bodies that do not overlap."""
+"""Gap at which bodies come to rest [m], so that the deformable contact solve starts without overlap."""
 
 
 def steps_of(frames: float, rate: float) -> int:
-    """Steps for some frames of a scene with that rate [1/s]."""
+    """Number of time steps for an interval in frames at a frame rate [1/s]."""
     return max(1, int(np.ceil(frames / rate / _LONGEST - 1e-9)))
 
 
@@ -50,16 +50,19 @@ def step_bodies(
     step: float,
     length: float,
 ) -> list[RigidContact]:
-    """Move bodies on by a step, in place; the contacts that pressed.
+    """Advance bodies by one time step, in place.
 
     Args:
-        bodies: All that are free.
-        obstacles: What moves by its animation, by name.
-        gravity: [m/s²], shape (3,).
-        friction: Between two names.
-        time: The obstacles', at the beginning [frames].
-        step: [frames].
+        bodies: All free bodies.
+        obstacles: Animated obstacles by name.
+        gravity: Acceleration [m/s²], shape (3,).
+        friction: Coulomb's μ between two names.
+        time: Time at the begin of the step [frames].
+        step: Length of the step [frames].
         length: The same [s].
+
+    Returns:
+        Contacts with a normal impulse.
     """
     for one in bodies:
         one.velocity = one.velocity + length * gravity
@@ -86,11 +89,11 @@ def step_bodies(
 
 
 _shapes: WeakKeyDictionary[Obstacle, NDArray[np.float64]] = WeakKeyDictionary()
-"""Points of rigid obstacles at time 0: making them takes as long as a step does."""
+"""Cache of the surface points of rigid obstacles at time 0, which take as long to make as a time step."""
 
 
 def _shape(obstacle: Obstacle, time: float) -> NDArray[np.float64]:
-    """Points of an obstacle's surface at a time [m], shape (n, 3)."""
+    """Surface points of an obstacle at a time [m], shape (n, 3)."""
     if not isinstance(obstacle, Rigid):
         return np.asarray(obstacle.mesh(time)[0], np.float64)
     if obstacle not in _shapes:
@@ -101,7 +104,12 @@ def _shape(obstacle: Obstacle, time: float) -> NDArray[np.float64]:
 def _impelled(
     bodies: Sequence[RigidBody], contacts: Sequence[RigidContact], length: float
 ) -> tuple[list[RigidContact], NDArray[np.float64]]:
-    """Give bodies the velocities after contact; those that press, and what else parts overlaps (B, 6) [m/s, rad/s]."""
+    """Apply contact impulses to the velocities of bodies.
+
+    Returns:
+        Contacts with a normal impulse, and pseudo-velocities that reduce overlaps, which change positions but not the
+        bodies' velocities, shape (B, 6) [m/s, rad/s].
+    """
     parting = np.zeros((len(bodies), 6))
     if not contacts:
         return [], parting
@@ -113,7 +121,7 @@ def _impelled(
     moves = inverse @ rows.T
     delassus = rows @ moves
     velocity = np.concatenate([np.concatenate([one.velocity, one.spin]) for one in bodies])
-    carried = np.concatenate([_axes(c) @ c.carried for c in contacts])
+    carried = np.concatenate([c.axes @ c.carried for c in contacts])
     gaps = np.array([c.gap - _SLOP for c in contacts])
     friction = np.array([c.friction for c in contacts])
     found = impulses(delassus, rows @ velocity - carried, np.maximum(gaps, 0.0) / length, friction)
@@ -121,12 +129,7 @@ def _impelled(
     for k, one in enumerate(bodies):
         one.velocity, one.spin = after[k, :3], after[k, 3:]
     if (gaps < 0.0).any():
-        some = impulses(delassus, np.zeros(len(rows)), _PARTED * gaps / length, np.zeros(len(gaps)))
-        parting = (moves @ some).reshape(-1, 6)
+        corrections = impulses(delassus, np.zeros(len(rows)), _PARTED * gaps / length, np.zeros(len(gaps)))
+        parting = (moves @ corrections).reshape(-1, 6)
     pressed = [c for c, p in zip(contacts, found[::3], strict=True) if p > 0.0]
     return pressed, parting
-
-
-def _axes(contact: RigidContact) -> NDArray[np.float64]:
-    """Normal and two tangents, as ``jacobian`` has them, shape (3, 3)."""
-    return np.concatenate([contact.normal[None], np.linalg.svd(contact.normal[None])[2][1:]])

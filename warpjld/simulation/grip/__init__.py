@@ -1,1 +1,1 @@
-"""Grips searched for: squeezes to a force or until a weight is held, and angles corrected to what muscles can do."""
+"""Grip searches (smallest grip that holds a weight, grip of a given force) and corrections to the muscles' limits."""

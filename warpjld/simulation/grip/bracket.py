@@ -1,10 +1,10 @@
-"""The one search that grips are found by: Newton's method on what rises with the grip, guarded by a bracket.
+"""Bracketed Newton search for the grip at which an increasing quantity reaches a target; used by all grip searches.
 
-What digits press with rises ever faster from the first touch on. Slopes at one or two grips tell how it stiffens
-(``warpjld.fem.hand.stiffening``), and so where the target lies; inside a bracket the cubic does that has values and
-slopes of both ends (inverse Hermite interpolation, of the value's root, which is nearly straight). Where no slope is
-known, the chord does; where nothing has been touched, steps grow. No step leaves the bracket, and one that lost an
-equilibrium is gone half of.
+Forces of digits increase ever faster from the first contact on. Outside a bracket, slopes at one or two grips give the
+stiffening (``warpjld.fem.hand.stiffening``) and thus the target; inside a bracket inverse cubic Hermite interpolation
+with values and slopes at both ends is used, applied to the square root of the value, which is nearly linear in the
+grip. Without slopes the secant is used; without contact steps grow geometrically. No step leaves the bracket, and a
+step to a grip without equilibrium is bisected.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from warpjld.fem.hand.stiffening import ForceSlope, way_to
 __all__ = ["Bracket", "checked_step"]
 
 _MARGIN = 0.03
-"""Part of a bracket, at either end, that is left alone."""
+"""Fraction of the bracket at either end in which no grip is tried."""
 _FARTHEST = 12.0
-"""How many times the last step outwards a Newton step may be."""
+"""Longest step outside a bracket, over the default step."""
 _SHORTEST = 0.01
-"""The same at least."""
+"""Shortest step outside a bracket, over the default step."""
 _POWER = 2.0
-"""Of the way since the first touch that a value rises with, before two slopes tell."""
+"""Assumed exponent of the value's growth since first contact, until two slopes are known."""
 _SLOW = 0.6
-"""Part of its bracket that a step should leave at most, or the next halves it."""
+"""Remaining fraction of a bracket above which the next step bisects it."""
 
 
 @dataclass(frozen=True)
 class _Point:
-    """A grip that was tried: what it measures, and the slope of that by the grip, where known."""
+    """A tried grip: its value, and the derivative of the value with respect to the grip; None if not known."""
 
     grip: float
     value: float
@@ -41,23 +41,24 @@ class _Point:
 
     @property
     def root(self) -> float:
+        """Square root of the value."""
         return math.sqrt(max(self.value, 0.0))
 
     @property
     def ahead(self) -> float | None:
-        """dgrip / droot."""
+        """Derivative of the grip with respect to the root of the value; None if not known."""
         if self.slope is None or not self.slope > 0.0 or not self.value > 0.0:
             return None
         return 2.0 * self.root / self.slope
 
 
 class Bracket:
-    """Where to look for the grip at which something that rises comes to a target.
+    """Search for the grip at which an increasing value reaches a target.
 
     Args:
         low, high: Range of grips.
-        target: Value that is wanted.
-        step: First step above ``low``, where nothing is known.
+        target: Target of the value.
+        step: First step above ``low`` as long as nothing is known.
     """
 
     def __init__(self, low: float, high: float, target: float, step: float) -> None:
@@ -69,8 +70,10 @@ class Bracket:
         self._width = math.inf
 
     def note(self, grip: float, value: float, slope: float | None, *, enough: bool) -> None:
-        """A grip was tried; whether its value is enough is for the caller to say. One that contradicts what was known
-        before (digits that push one another do) is believed."""
+        """Record a tried grip; ``enough`` tells whether its value reaches the target, by the caller's criterion.
+
+        A result that contradicts earlier ones (possible where digits push one another) replaces them.
+        """
         point = _Point(grip, value, slope)
         if enough:
             self._below = [one for one in self._below if one.grip < grip]
@@ -80,56 +83,56 @@ class Bracket:
             self._below.append(point)
 
     def distrust(self) -> None:
-        """What was measured until now was something else: grips stay as bounds, without values and slopes."""
+        """Discard all values and slopes, which measured another quantity; the grips remain as bounds."""
         self._below = [_Point(one.grip, math.nan, None) for one in self._below]
         self._above = [_Point(one.grip, math.nan, None) for one in self._above]
 
     def lose(self, grip: float) -> None:
-        """A grip at which no equilibrium was found."""
+        """Record a grip at which no equilibrium was found."""
         self._lost.append(grip)
 
     @property
     def below(self) -> _Point | None:
-        """The firmest that was not enough."""
+        """Largest grip that was not enough."""
         return max(self._below, key=lambda one: one.grip, default=None)
 
     @property
     def above(self) -> _Point | None:
-        """The gentlest that was enough."""
+        """Smallest grip that was enough."""
         return min(self._above, key=lambda one: one.grip, default=None)
 
     @property
     def width(self) -> float:
-        """Of the bracket; infinite where it is open."""
+        """Width of the bracket; infinite as long as an end is open."""
         below, above = self.below, self.above
         return math.inf if below is None or above is None else above.grip - below.grip
 
     def next(self) -> float | None:
-        """The grip to try; None where there is none left: the range is at its end, or lost on both sides."""
+        """Next grip to try; None if the range or the bracket is exhausted."""
         below, above = self.below, self.above
         floor = self.low if below is None else below.grip
         top = self.high if above is None else above.grip
         if not top > floor:
             return None
         lost = [one for one in self._lost if floor < one <= top]
-        wished = self._wished(below, above)
-        narrow = self.width
+        proposed = self._predicted(below, above)
+        width = self.width
         if above is not None and below is not None:
-            if narrow > _SLOW * self._width:  # the last step left most of the bracket
-                wished = 0.5 * (floor + top)
-            self._width = narrow
+            if width > _SLOW * self._width:  # the last step reduced the bracket too little
+                proposed = 0.5 * (floor + top)
+            self._width = width
             room = _MARGIN * (top - floor)
-            wished = float(np.clip(wished, floor + room, top - room))
+            proposed = float(np.clip(proposed, floor + room, top - room))
         elif above is None:
-            wished = min(wished, self.high)
+            proposed = min(proposed, self.high)
         else:
-            wished = max(wished, self.low)
-        if lost and wished >= min(lost):
-            wished = 0.5 * (floor + min(lost))
-        return wished
+            proposed = max(proposed, self.low)
+        if lost and proposed >= min(lost):
+            proposed = 0.5 * (floor + min(lost))
+        return proposed
 
-    def _wished(self, below: _Point | None, above: _Point | None) -> float:
-        """Where the value is foreseen to be the target."""
+    def _predicted(self, below: _Point | None, above: _Point | None) -> float:
+        """Grip at which the target is predicted."""
         aim = math.sqrt(self.target)
         if below is not None and above is not None:
             return _between(self._sloped(below, self._below), self._sloped(above, self._above), aim)
@@ -137,14 +140,14 @@ class Bracket:
         if known is None:
             return self.low
         if known.ahead is not None:
-            far = self._way(known, self._below if above is None else self._above)
+            far = self._distance(known, self._below if above is None else self._above)
             if above is None:
                 return known.grip + min(max(far, _SHORTEST * self._step), _FARTHEST * self._step)
             return known.grip + min(far, -_SHORTEST * self._step)
         return self._inward(known) if below is None else self._outward(known)
 
-    def _way(self, known: _Point, side: list[_Point]) -> float:
-        """How far it is to the target from one point, and the next one on its side, if that is known."""
+    def _distance(self, known: _Point, side: list[_Point]) -> float:
+        """Distance to the target extrapolated from a point and its nearest neighbour on the same side, if any."""
         others = [one for one in side if one.grip != known.grip and one.ahead is not None]
         near = min(others, key=lambda one: abs(one.grip - known.grip), default=None)
         here = ForceSlope(known.value, known.slope or math.nan)
@@ -153,7 +156,7 @@ class Bracket:
 
     @staticmethod
     def _sloped(end: _Point, side: list[_Point]) -> _Point:
-        """An end of the bracket with a slope from the next point on its side, where it has none of its own."""
+        """An end of the bracket; without a slope, with the secant slope to its nearest neighbour on the same side."""
         others = [one for one in side if one.grip != end.grip and one.root > 0.0]
         if end.ahead is not None or not others:
             return end
@@ -162,7 +165,7 @@ class Bracket:
         return replace(end, slope=2.0 * end.root * rise) if rise > 0.0 else end
 
     def _inward(self, first: _Point) -> float:
-        """Gentler by a longer step each time; along the chord where two points rise."""
+        """A smaller grip, by steps that double, or along the secant if two points increase."""
         step, self._step = self._step, 2.0 * self._step
         sloped = self._sloped(first, self._above)
         if sloped.ahead is None:
@@ -170,7 +173,7 @@ class Bracket:
         return first.grip - max((first.root - math.sqrt(self.target)) * sloped.ahead, _SHORTEST * step)
 
     def _outward(self, last: _Point) -> float:
-        """Farther on by a longer step each time; along the chord where two points rise."""
+        """A larger grip, by steps that double, or along the secant if two points increase."""
         others = [one for one in self._below if one.grip < last.grip]
         step, self._step = self._step, 2.0 * self._step
         before = max(others, key=lambda one: one.grip, default=None)
@@ -181,25 +184,25 @@ class Bracket:
 
 
 def _between(below: _Point, above: _Point, aim: float) -> float:
-    """Inside a bracket, by what is known at its ends; its middle where that does not rise."""
+    """Inverse Hermite interpolation of the root in a bracket; its middle where values do not increase."""
     rise = above.root - below.root
     if not (math.isfinite(rise) and rise > 0.0 and 0.0 < below.root < aim <= above.root):
         nearest = [one for one in (below, above) if one.ahead is not None and math.isfinite(one.root)]
         guesses = [one.grip + (aim - one.root) * (one.ahead or 0.0) for one in nearest]
         inside = [guess for guess in guesses if below.grip < guess < above.grip]
-        return inside[-1] if inside else 0.5 * (below.grip + above.grip)  # where touch begins is not known
-    width, share = above.grip - below.grip, (aim - below.root) / rise
+        return inside[-1] if inside else 0.5 * (below.grip + above.grip)  # the grip of first contact is not known
+    width, t = above.grip - below.grip, (aim - below.root) / rise
     chord = width / rise
+    # slopes of at most three times the secant keep the cubic monotone (Fritsch and Carlson 1980)
     first, last = (chord if one.ahead is None else min(one.ahead, 3.0 * chord) for one in (below, above))
-    t = share
     return below.grip + width * t * t * (3.0 - 2.0 * t) + rise * t * (1.0 - t) * (first * (1.0 - t) - last * t)
 
 
 def checked_step(low: float, high: float, start: float | None) -> float:
-    """The first step above ``low``: as given, or a sixteenth of the range.
+    """First step above ``low``: ``start``, or a sixteenth of the range.
 
     Raises:
-        InputError: A range that is none, or a step out of it.
+        InputError: An empty range, or a step outside it.
     """
     if not (np.isfinite([low, high]).all() and low < high):
         raise InputError(f"grip: want low < high, got {low} and {high}")

@@ -1,4 +1,4 @@
-"""Opening digits until muscles can hold them: bones' positions corrected automatically (R120)."""
+"""Automatic correction of joint angles: digits are opened until their muscles can hold them (R120)."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from warpjld.skeleton.tree import CHANNELS, Skeleton
 __all__ = ["CorrectedPose", "Correction", "Slopes", "correct_angles"]
 
 _FIRST = 0.04
-"""Share of the way back that is tried first, where no slope is known."""
+"""First opening that is tried without a slope, as a fraction of the way to the open posture."""
 _NARROW = 1e-3
-"""Share of the way within which an opening is known well enough."""
+"""Width of the bracket, as a fraction of that way, at which the search ends."""
 
 Slopes = Callable[[NDArray[np.float64], Mapping[str, NDArray[np.float64]]], Mapping[str, float] | None]
-"""Angles (J, 4) that were solved, and for each digit a direction (J, 4) → derivative of its share along that."""
+"""Solved angles (J, 4) and a direction (J, 4) by digit → derivative of each digit's load share along it; None if not
+known."""
 
 
 class Correction(Enum):
-    """How a correction ended; the value is the message for people."""
+    """How a correction ended; the value is the message."""
 
     NOT_NEEDED = "muscles can hold the pose as it is"
     CORRECTED = "digits were opened until muscles can hold them"
@@ -41,11 +42,11 @@ class CorrectedPose:
     """A corrected pose.
 
     Attributes:
-        status: How it ended.
+        status: How the correction ended.
         angles: Joint angles [rad], shape (J, 4).
-        effort: The effort there, None where contact was not solved.
-        opened: Digit → how far each of its joints was opened [rad], shape (3,).
-        solves: Contact solutions it took.
+        effort: Effort of the muscles there; None if contact was not solved.
+        opened: Digit → angles by which its joints were opened [rad], shape (3,).
+        solves: Number of contact solutions.
     """
 
     status: Correction
@@ -66,23 +67,23 @@ def correct_angles(
     solves: int = 12,
     slopes: Slopes | None = None,
 ) -> CorrectedPose:
-    """Open the digits that bear too much until each bears ``aim`` of its limit, or a little less.
+    """Open the digits that exceed their limits until each bears ``aim`` of its limit, or a little less.
 
-    A digit opens along the way back to its open posture. All digits are corrected in the same solves; each one's
-    way is found by ``Bracket``, so the loop ends.
+    A digit opens along the line from its angles to its open posture. All digits are corrected in the same solves; the
+    position of each is found by a ``Bracket``.
 
     Args:
-        solve: Effort at joint angles (J, 4), or None where contact could not be solved there.
+        solve: Effort at joint angles (J, 4); None if contact could not be solved there.
         skeleton: The skeleton.
-        angles: Wanted joint angles [rad], shape (J, 4).
-        open_angles: Where digits open to, as before the hand closed, shape (J, 4).
-        aim: Share of the limits that digits may reach.
-        tolerance: How much below ``aim`` a corrected digit may be, as a share.
-        solves: Contact solutions allowed.
-        slopes: How shares follow the digits, where that is known.
+        angles: Joint angles to correct [rad], shape (J, 4).
+        open_angles: Angles to open towards, as before the hand closed [rad], shape (J, 4).
+        aim: Load share (load over limit) that digits may reach.
+        tolerance: How far below ``aim`` a corrected digit may be, relative to ``aim``.
+        solves: Most contact solutions.
+        slopes: Derivatives of load shares, where known.
 
     Raises:
-        InputError: Angles of another shape, or an aim that is none.
+        InputError: Angles of the wrong shape, or ``aim`` or ``tolerance`` out of range.
     """
     if angles.shape != (len(skeleton), len(CHANNELS)) or open_angles.shape != angles.shape:
         raise InputError(f"angles: want shape ({len(skeleton)}, {len(CHANNELS)}), got {angles.shape}")
@@ -97,7 +98,7 @@ def correct_angles(
     best, at_best = None, angles.copy()
     trial, effort = angles, first
     for number in range(1, solves + 1):
-        digits.note(effort, None if slopes is None else slopes(trial, digits.ways))
+        digits.note(effort, None if slopes is None else slopes(trial, digits.directions))
         if all(d.share <= aim for d in effort.digits):
             best, at_best = effort, trial
             if digits.done:
@@ -117,7 +118,7 @@ def correct_angles(
 
 
 class _Digits:
-    """All digits of a hand on their ways back to where they open to."""
+    """Searches for the opening of all digits of a hand, made in common solves."""
 
     def __init__(
         self,
@@ -134,8 +135,8 @@ class _Digits:
         self._closings = {digit.digit: _Closing(wanted) for digit in first.digits}
 
     @property
-    def ways(self) -> dict[str, NDArray[np.float64]]:
-        """How angles change as each digit closes from its open posture, per share of the way, shape (J, 4)."""
+    def directions(self) -> dict[str, NDArray[np.float64]]:
+        """Change of the angles as each digit closes from its open posture, per closing 0 … 1, shape (J, 4)."""
         out = {}
         for digit in self._closings:
             joints, now, back = self._ends(digit)
@@ -144,23 +145,23 @@ class _Digits:
         return out
 
     def note(self, effort: Effort, slopes: Mapping[str, float] | None) -> None:
-        """Take note of what digits bear where they are."""
+        """Record the load shares of the digits at their current closings."""
         for digit in effort.digits:
             slope = None if slopes is None else slopes.get(digit.digit)
-            self._closings[digit.digit].seen(digit.share, slope, self._aim)
+            self._closings[digit.digit].note(digit.share, slope, self._aim)
 
     @property
     def done(self) -> bool:
-        """Whether none needs to be opened by less."""
+        """Whether no digit is opened more than necessary."""
         return all(one.done(self._tolerance, self._aim) for one in self._closings.values())
 
     @property
     def stuck(self) -> bool:
-        """Whether one cannot be opened farther."""
+        """Whether a digit exceeds its limit although it is completely open."""
         return any(one.stuck for one in self._closings.values())
 
     def opened(self) -> NDArray[np.float64]:
-        """The angles to try next, shape (J, 4)."""
+        """Angles to try next [rad], shape (J, 4)."""
         trial = self._angles.copy()
         for digit, closing in self._closings.items():
             joints, now, back = self._ends(digit)
@@ -168,23 +169,20 @@ class _Digits:
         return trial
 
     def _ends(self, digit: str) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
-        """A digit's joints, their flexions, and those they open to [rad]."""
+        """A digit's joints, their given flexions, and those of the open posture [rad]."""
         joints = [self._skeleton.index(f"{digit}.{k}") for k in KNUCKLES]
         now = self._angles[joints, FLEXION]
         return joints, now, np.minimum(self._open[joints, FLEXION], now)
 
 
 class _Closing:
-    """How much of its way a digit is closed, 0 … 1, and the shares met so far.
-
-    Digits that push one another may contradict what was known: what was seen last is believed.
-    """
+    """Search for the closing of one digit between open posture (0) and given angles (1)."""
 
     def __init__(self, wanted: float) -> None:
         self.at, self.share = 1.0, 0.0
         self._bracket = Bracket(0.0, 1.0, wanted, _FIRST)
 
-    def seen(self, share: float, slope: float | None, aim: float) -> None:
+    def note(self, share: float, slope: float | None, aim: float) -> None:
         self.share = share
         self._bracket.note(self.at, share, slope, enough=share > aim)
 
@@ -195,7 +193,7 @@ class _Closing:
 
     def done(self, tolerance: float, aim: float) -> bool:
         above, below = self._bracket.above, self._bracket.below
-        if above is None:  # never too much as far as it closed
+        if above is None:  # never above its limit
             return below is not None and below.grip >= 1.0
         return aim * (1.0 - tolerance) <= self.share <= aim or self._bracket.width < _NARROW
 

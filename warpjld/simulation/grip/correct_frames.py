@@ -1,4 +1,4 @@
-"""Digits opened at frames where they bear more than their muscles can (R120)."""
+"""Correction of solved frames: digits are opened where they exceed the limits of their muscles (R120)."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ from warpjld.skeleton.channels import FLEXION
 __all__ = ["CorrectedDigit", "CorrectedFrame", "correct_frame", "uncorrected", "worst_digits"]
 
 _AIM = 1.0
-"""Share of their limits that digits may reach."""
+"""Load share (load over limit) that digits may reach."""
 _STILL = 1e-3
-"""Flexion that is none [rad]."""
+"""Change of flexion below which a joint counts as not having closed [rad]."""
 
 
 @dataclass(frozen=True)
 class CorrectedDigit:
-    """One digit at one frame.
+    """Correction of one digit at one frame.
 
     Attributes:
-        actor: Whose.
-        frame: Number.
-        digit: As ``left.index``.
-        before, after: What it bore, and bears [N].
-        limit: Largest force [N].
-        opened: By how much its joints were opened [rad].
-        status: Name of how the correction of the frame ended.
+        actor: Name of the actor.
+        frame: Frame number.
+        digit: Name in the skeleton, as ``left.index``.
+        before, after: Force before and after the correction [N].
+        limit: Force limit [N].
+        opened: Angles by which its joints were opened [rad].
+        status: Name of the ``Correction`` status of the frame.
     """
 
     actor: str
@@ -67,13 +67,13 @@ class CorrectedDigit:
 
 @dataclass(frozen=True, eq=False)
 class CorrectedFrame:
-    """A frame after all hands that bore too much were corrected.
+    """A frame after the correction of all hands above their limits.
 
     Attributes:
-        solution: The equilibrium at the corrected angles, or the one found where nothing had to be.
-        edits: The corrected angles.
-        digits: What was opened.
-        failed: What could not be, in words.
+        solution: Equilibrium at the corrected angles; the original one if no correction was needed or possible.
+        edits: Corrected angles as edits of the animation.
+        digits: Corrected digits.
+        failed: Messages about hands that could not be corrected.
     """
 
     solution: ContactSolution
@@ -89,14 +89,14 @@ def correct_frame(
     found: ContactSolution,
     limits: Mapping[str, Mapping[str, float]],
 ) -> CorrectedFrame:
-    """Open the digits that bear too much at a frame.
+    """Open the digits that exceed their limits at a frame.
 
     Args:
-        model: Everything.
-        history: What is known at the frame before.
-        before: Equilibrium there.
+        model: The contact model.
+        history: History at the previous frame.
+        before: Equilibrium at the previous frame.
         found: Equilibrium at the frame, at the angles of the animation.
-        limits: Largest forces of digits [N], by actor and digit, where they are not the default.
+        limits: Force limits of digits that differ from the default [N], by actor and digit.
     """
     out = CorrectedFrame(found)
     for hand in model.hands:
@@ -109,7 +109,7 @@ def correct_frame(
 
 
 def worst_digits(frames: Sequence[CorrectedFrame]) -> list[CorrectedDigit]:
-    """Of every digit the frame at which it bore most before it was corrected."""
+    """For every corrected digit, the frame at which its force before correction was largest."""
     out: dict[tuple[str, str], CorrectedDigit] = {}
     for one in (digit for frame in frames for digit in frame.digits):
         place = (one.actor, one.digit)
@@ -120,7 +120,7 @@ def worst_digits(frames: Sequence[CorrectedFrame]) -> list[CorrectedDigit]:
 
 @dataclass(frozen=True, eq=False)
 class _Hand:
-    """One hand on its way from a frame to the next."""
+    """Correction of one hand between two frames."""
 
     model: ContactModel
     history: History
@@ -129,7 +129,7 @@ class _Hand:
     limits: Mapping[str, float] | None
 
     def corrected(self, found: ContactSolution) -> CorrectedFrame:
-        """The equilibrium at the corrected angles, or the one found where nothing has to be."""
+        """Corrected frame; with ``found`` unchanged if no correction is needed or possible."""
         bones, time, since = self.hand.bones, found.last.time, self.before.last.time
         wanted, then, opened = bones.angles(time), bones.angles(since), bones.angles(0.0)
         first = self._effort(wanted, found)
@@ -178,7 +178,7 @@ class _Hand:
         return tuple(out)
 
     def _at(self, then: NDArray[np.float64], angles: NDArray[np.float64], duration: float) -> ContactSolution:
-        """Equilibrium at other angles than the animation's, reached from the frame before."""
+        """Equilibrium at given angles, reached from the previous frame."""
         bones, since = self.hand.bones, self.before.last.time
         steps = bones.steps([(then, since), (angles, since + duration)], TRAVEL)
         moves = (
@@ -190,7 +190,7 @@ class _Hand:
     def _slopes(
         self, angles: NDArray[np.float64], solution: ContactSolution, ways: Mapping[str, NDArray[np.float64]]
     ) -> dict[str, float] | None:
-        """How each digit's share follows its own way; None where that is not known."""
+        """Derivative of each digit's load share along its direction of closing; None if not known."""
         model, hand, time = self.model, self.hand, solution.last.time
         if solution.last_step is None:
             return None
@@ -217,7 +217,7 @@ class _Hand:
 def uncorrected(
     model: ContactModel, found: ContactSolution, limits: Mapping[str, Mapping[str, float]], frame: float
 ) -> CorrectedFrame:
-    """The first frame that is solved: what bears too much there is named, since nothing came before to open from."""
+    """The first solved frame, which has none before it to correct from: names the digits above their limits."""
     failed = []
     for hand in model.hands:
         if hand.bones.bendable:
@@ -238,7 +238,8 @@ def _too_much(hand: FleshBody, frame: float, effort: Effort) -> str:
 def _not_corrected(
     hand: FleshBody, frame: float, effort: Effort, status: Correction, closed: NDArray[np.float64]
 ) -> str:
-    """What bears too much, and why opening does not help, of joints (J,) that have closed by so much [rad]."""
+    """Message about digits above their limits and why opening failed; ``closed``: change of flexion by joint [rad],
+    shape (J,)."""
     names = [one.digit for one in effort.digits if one.share > _AIM]
     joints = [hand.bones.skeleton.index(f"{name}.{knuckle}") for name in names for knuckle in KNUCKLES]
     why = status.value
@@ -250,5 +251,5 @@ def _not_corrected(
 def _posed_along(
     hand: FleshBody, angles: NDArray[np.float64], way: NDArray[np.float64], time: float, by: float
 ) -> Poses:
-    """The pose so far along a way."""
+    """Pose at the angles moved by ``by`` along a direction (J, 4)."""
     return hand.bones.posed(angles + by * way, time)

@@ -1,4 +1,4 @@
-"""Grips found while frames are solved: the gentlest that holds an object, or the one of a wished force (R123, R124)."""
+"""Grip searches during a solve: the smallest grip that holds an object, or the grip of a given force (R123, R124)."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.hold import HandTrials
 from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
 from warpjld.simulation.grip.squeeze import Squeeze
+from warpjld.simulation.report.table import csv_cell
 from warpjld.simulation.specification import GripSpecification
 from warpjld.skeleton.channels import FLEXION
 
@@ -30,29 +31,32 @@ __all__ = ["FoundGrip", "SupportRelease", "find_grip", "write_grips"]
 _START = math.radians(0.5)
 """First step of a search [rad]."""
 _NEAR = 0.03
-"""How near to the gentlest grip, as a share of its force."""
+"""Tolerance of the smallest grip, relative to its force."""
 
 _TRIALS = 10
-"""Grips that are tried at most: as a rule three or four are enough."""
+"""Most grips tried; as a rule three or four are enough."""
 
 _PRESSES = 0.01
-"""A digit presses with more than this share of the strongest: flesh between two digits hands a little on to both."""
+"""Force relative to that of the strongest digit above which a digit counts as pressing: flesh between two digits
+transmits a little to both."""
 
 _HELD = (GripStatus.HELD, GripStatus.HELD_AT_ONCE)
+"""Statuses of a successful search."""
 _COLUMNS = (
     *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
     *("chosen", "status"),
 )
+"""Columns of the table of trials."""
 
 
 @dataclass(frozen=True)
 class SupportRelease:
-    """A support that lets go of its object.
+    """Release of an object's support.
 
     Attributes:
-        object: Name.
-        begins, free: From when to when [frames from the model's start].
-        lowered: Displacement of the object's middle along the weight's axis meanwhile [m].
+        object: Name of the object.
+        begins, free: Begin and end of the release [frames from the model's start].
+        lowered: Displacement of the object's handle along the axis of gravity during the release [m].
     """
 
     object: str
@@ -61,7 +65,7 @@ class SupportRelease:
     lowered: float
 
     def applied(self, one: ObjectBody) -> ObjectBody:
-        """An object with its support let go of, if it is the one that is meant."""
+        """The object with its support released, if it is the named one; others unchanged."""
         if one.name != self.object or one.support is None:
             return one
         return replace(one, support=one.support.released(self.begins, self.free, self.lowered))
@@ -69,19 +73,20 @@ class SupportRelease:
 
 @dataclass(frozen=True, eq=False)
 class FoundGrip:
-    """A grip that was searched for.
+    """Result of a grip search.
 
     Attributes:
-        request: What was asked.
-        status: Name of how it ended.
-        text: One line for people.
-        grip: Angle by which the digits close on [rad]; 0 where nothing was found.
-        lowered: How far the object's middle sinks when the hand takes its weight [m]; None where it does not.
+        request: The specification of the grip.
+        status: Name of the status with which the search ended.
+        text: Summary in one line.
+        grip: Angle by which the digits close further [rad]; 0 if no grip was found.
+        lowered: Displacement of the object's handle along the axis of gravity when the hand takes its weight [m]; None
+            if it does not.
         force: Sum of the normal forces on the object, or of the digits' forces [N].
-        digits: Digit → force [N], largest force [N], largest share of the muscles' limits.
-        rows: Every grip tried, for a table.
-        edits: Angles of the digits that close.
-        release: How the object's support lets go; None where it does not.
+        digits: Digit → force [N], force limit [N], largest load share.
+        rows: One row for every grip tried.
+        edits: Angles of the closing digits.
+        release: Release of the object's support; None if it is not released.
     """
 
     request: GripSpecification
@@ -97,11 +102,11 @@ class FoundGrip:
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C ended it."""
+        """Whether Ctrl-C ended the search."""
         return self.status == GripStatus.INTERRUPTED.name
 
     def content(self) -> dict[str, Any]:
-        """As plain values."""
+        """The result as plain values for JSON."""
         return {
             "actor": self.request.actor,
             "object": self.request.object,
@@ -126,17 +131,15 @@ def find_grip(
     limits: Mapping[str, float],
     tell: Callable[[str], None] = lambda line: None,
 ) -> FoundGrip:
-    """Search, from the equilibrium at its first frame.
-
-    Ctrl-C ends it with what was tried until then.
+    """Search for a grip from the equilibrium at its first frame; Ctrl-C ends the search with the trials so far.
 
     Args:
-        model: Everything.
-        history: What is known at that frame.
-        request: What is asked.
-        after: The equilibrium.
-        limits: Digit → largest force [N], where it is not the default.
-        tell: Told a line about every grip that was tried.
+        model: The contact model.
+        history: History at that frame.
+        request: Specification of the grip.
+        after: Equilibrium at its first frame.
+        limits: Digit → force limit that differs from the default [N].
+        tell: Called with a line about every grip tried.
     """
     hand = next(one for one in model.hands if one.name == request.actor)
     joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in request.channels]
@@ -151,7 +154,7 @@ def find_grip(
 
 
 def _edits(hand: FleshBody, request: GripSpecification, joints: Sequence[int], grip: float) -> tuple[AngleEdit, ...]:
-    """Digits closed on by a grip from where they are held."""
+    """Edits that close the digits by a grip, up to their joint limits."""
     if grip == 0.0:
         return ()
     now = hand.bones.animation.angles(request.first)[joints, FLEXION]
@@ -163,6 +166,7 @@ def _edits(hand: FleshBody, request: GripSpecification, joints: Sequence[int], g
 
 
 def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: Callable[[str], None]) -> FoundGrip:
+    """Search for the smallest grip up to ``most`` [rad] that holds the object's weight."""
     model = squeeze.model
     one = next(body for body in model.objects if body.name == request.object)
     friction = max(
@@ -198,6 +202,7 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: C
 
 
 def _firm(request: GripSpecification, squeeze: Squeeze, most: float, tell: Callable[[str], None]) -> FoundGrip:
+    """Search for the grip up to ``most`` [rad] whose digits press with the requested force."""
     assert request.force is not None
     counted = request.digits or tuple(dict.fromkeys(channel.split(".")[-3] for channel in request.channels))
     instants: dict[float, ContactInstant] = {}
@@ -228,7 +233,7 @@ def _firm(request: GripSpecification, squeeze: Squeeze, most: float, tell: Calla
 
 
 def _digits(effort: Effort | None) -> dict[str, tuple[float, float, float]]:
-    """Digits that press."""
+    """Force, force limit and load share of the digits that press."""
     if effort is None:
         return {}
     least = _PRESSES * max(d.force for d in effort.digits)
@@ -252,15 +257,9 @@ def _row(
 
 
 def write_grips(path: Path, found: Sequence[FoundGrip]) -> None:
-    """Every grip that was tried as CSV, one row each."""
+    """Write every grip tried as CSV, one row each."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, _COLUMNS, restval="")
         writer.writeheader()
         for one in found:
-            writer.writerows({key: _short(value) for key, value in row.items()} for row in one.rows)
-
-
-def _short(value: object) -> object:
-    if not isinstance(value, float):
-        return value
-    return "" if math.isnan(value) else f"{value:.6g}"
+            writer.writerows({key: csv_cell(value) for key, value in row.items()} for row in one.rows)

@@ -1,4 +1,4 @@
-"""The grip that presses with a wished force, or a reason why none does (R118, R123)."""
+"""Search for the grip with a given total force, or the reason why there is none (R118, R123)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from warpjld.simulation.grip.bracket import Bracket, checked_step
 __all__ = ["ForceGrip", "ForceStatus", "PressedForce", "force_grip"]
 
 _ROUNDS = 24
-"""Grips tried at most: where slopes are known, three or four are enough."""
+"""Most grips tried; with slopes three or four are enough."""
 _LOST = 3
-"""Times an equilibrium may not be found."""
+"""Grips without an equilibrium after which the search ends."""
 
 
 class ForceStatus(Enum):
-    """How a search for a force ended; the value is the message for people."""
+    """How a search for a force ended; the value is the message."""
 
     REACHED = "the digits press as asked"
     HARDER_ALREADY = "the digits press harder than that before they close on"
@@ -33,13 +33,13 @@ class ForceStatus(Enum):
 
 @dataclass(frozen=True)
 class PressedForce:
-    """What a grip presses with.
+    """Force of a grip.
 
     Attributes:
-        force: [N]
-        share: The largest share of the muscles' limits.
-        who: The digit that has it.
-        slope: Derivative of the force by the grip, where it is known.
+        force: Total force [N].
+        share: Largest load share (load over limit) of the muscles.
+        who: Digit with that share.
+        slope: Derivative of the force with respect to the grip; None if not known.
     """
 
     force: float
@@ -50,14 +50,14 @@ class PressedForce:
 
 @dataclass(frozen=True)
 class ForceGrip:
-    """The grip found, or the firmest that muscles can hold of those tried.
+    """The grip found, or the nearest grip tried that the muscles can hold.
 
     Attributes:
         status: How the search ended.
-        grip: Its measure, as handed to ``press``.
-        pressed: What it presses with; None where no grip was solved.
+        grip: Grip, the argument of ``press``.
+        pressed: Its force; None if no grip was solved.
         trials: Every grip tried, in order.
-        text: For people.
+        text: Summary in one line.
     """
 
     status: ForceStatus
@@ -79,15 +79,15 @@ def force_grip(
     """Close until a force is reached (see ``Bracket``).
 
     Args:
-        press: What a grip presses with, more the firmer; None where contact could not be solved.
-        low: Gentlest grip.
-        high: Firmest grip allowed.
-        force: Wished [N].
-        start: First step above ``low`` where nothing is touched, by default a sixteenth of the range.
-        tolerance: Of the force, as a share.
+        press: Force of a grip, increasing with the grip; None if contact could not be solved.
+        low: Smallest grip.
+        high: Largest grip.
+        force: Target force [N].
+        start: First step above ``low`` without contact; by default a sixteenth of the range.
+        tolerance: Relative tolerance of the force.
 
     Raises:
-        InputError: A range or a force that is none.
+        InputError: Range, force or tolerance out of range.
     """
     step = checked_step(low, high, None if start is None else min(float(start), high - low))
     if not (np.isfinite(force) and force > 0.0 and 0.0 < tolerance < 1.0):
@@ -120,7 +120,7 @@ def force_grip(
 def _status(
     found: PressedForce, force: float, tolerance: float, grip: float, low: float, high: float
 ) -> ForceStatus | None:
-    """How the search ends with a grip; None where it goes on."""
+    """Status with which a grip ends the search; None to continue."""
     if abs(found.force - force) <= tolerance * force:
         return ForceStatus.REACHED if found.share <= 1.0 else ForceStatus.TOO_WEAK
     if found.force > force:
@@ -133,7 +133,7 @@ def _status(
 
 
 def _ended(status: ForceStatus, force: float, low: float, trials: list[tuple[float, PressedForce]]) -> ForceGrip:
-    """The grip of a status: the nearest to the force that muscles can hold, from below if it is not reached."""
+    """Result with the grip nearest to the force that muscles can hold; from below if the force was not reached."""
     able = [one for one in trials if one[1].share <= 1.0]
     near = able if status is ForceStatus.REACHED else [one for one in able if one[1].force <= force]
     if not near:

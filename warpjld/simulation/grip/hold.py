@@ -1,7 +1,7 @@
-"""Whether a hand holds an object's weight at a grip: its support is taken away, and what comes of it (R122–R124).
+"""Trial whether a hand holds an object's weight at a grip, by removing the object's support (R122–R124).
 
-First what the object stands on lets go, and a handle in its middle bears what the hand does not; then the handle is
-lowered (``warpjld.simulation.grip.lower``).
+First the support points are released while the height of a central node (the handle) is prescribed, which then bears
+what the hand does not; then the handle is lowered (``warpjld.simulation.grip.lower``).
 """
 
 from __future__ import annotations
@@ -28,25 +28,26 @@ from warpjld.simulation.solve.branch import solve_branch
 __all__ = ["HandTrials", "WeightTrials"]
 
 _FADING, _LETTING_GO = 3, 1
-"""How often a step may be halved while the support goes, and when the handle does; steps down may not: shorter ones are
-tried then."""
+"""Most halvings of the load step that releases the support, and of that which releases the handle; steps down are not
+halved but repeated with a shorter step."""
 _HOPELESS = 0.6
-"""Share of the weight that pressures must be able to bear before its support is taken away. Not 1: as the weight comes
-on, an object drags pads along and presses them harder, by a fifth on fingertips."""
+"""Share of the weight that friction must be able to bear with the pressures before the support is removed. Not 1: under
+the weight an object drags the pads along and presses them harder, by a fifth on fingertips."""
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
+"""No Dirichlet conditions."""
 
 
 class WeightTrials(ABC):
-    """Grips tried on an object: the callable that ``gentlest_grip`` asks for.
+    """Trial grips on an object: the callable that ``gentlest_grip`` needs.
 
     Args:
-        weight: The object's weight, and what bears it.
+        weight: The object's weight, shared by hand and handle.
         body: Hand and object, merged.
-        pairs: What may touch.
+        pairs: Contact pairs.
 
     Attributes:
-        found: The equilibria of every grip tried, those on the way included.
-        lowered: How the object was lowered at every grip whose pressures could bear it.
+        found: Equilibria of every grip tried, with all load steps.
+        lowered: Descent of the object at every grip whose pressures could bear it.
     """
 
     def __init__(self, weight: SharedWeight, body: Body, pairs: Sequence[Pair]) -> None:
@@ -56,7 +57,7 @@ class WeightTrials(ABC):
         self._begun: dict[float, float] = {}
 
     def __call__(self, grip: float) -> Trial:
-        """What a grip does."""
+        """Trial of a grip."""
         closed = self.closed(grip)
         self.found[grip] = closed
         if not closed.converged:
@@ -85,22 +86,23 @@ class WeightTrials(ABC):
 
     @abstractmethod
     def closed(self, grip: float) -> ContactSolution:
-        """Equilibrium in which the hand has closed, and something else bears the object."""
+        """Equilibrium with the hand closed and the object on its support."""
 
     @abstractmethod
     def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
-        """After it: all the weight on hand and handle."""
+        """Subsequent equilibrium without the support: hand and handle bear the weight."""
 
     @abstractmethod
     def moved(self, grip: float, after: ContactSolution, height: float) -> ContactSolution:
-        """After another: the handle at a height [m]."""
+        """Subsequent equilibrium with the handle at a height [m]."""
 
     @abstractmethod
     def released(self, grip: float, after: ContactSolution) -> ContactSolution:
-        """After another: without the handle."""
+        """Subsequent equilibrium without the handle."""
 
     def _sinking(self, grip: float, after: ContactSolution) -> float | None:
-        """How much more of the weight the hand bears per metre that the handle goes down; None where not known."""
+        """Derivative of the weight share that the hand bears with respect to lowering the handle [1/m]; None if not
+        known."""
         known = np.append(self.held(grip), 3 * self.weight.handle + self.weight.axis)
         try:
             tangent = EquilibriumTangent(self.body, self.pairs, after, known, steadied=True)
@@ -110,27 +112,27 @@ class WeightTrials(ABC):
 
     @abstractmethod
     def held(self, grip: float) -> NDArray[np.int64]:
-        """Prescribed degrees of freedom while the object has nothing but hand and handle, the handle's left out."""
+        """Prescribed degrees of freedom without the object's support, those of the handle excluded."""
 
     @abstractmethod
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
-        """Of that equilibrium, and what a firmer grip changes, per unit of it.
+        """Tangent at the equilibrium ``closed``, and the perturbation per unit of the grip.
 
         Raises:
-            SensitivityError: No derivative.
+            SensitivityError: The equilibrium has no derivative.
         """
 
     @abstractmethod
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
-        """Largest share of the muscles' limits, and the digit that has it."""
+        """Largest load share of the muscles, and the digit that has it."""
 
     def beneath(self, instant: ContactInstant) -> str:
-        """What else bears the object, and how much."""
+        """Message about what else bears the object; empty if nothing does."""
         return ""
 
     def taken(self, grip: float) -> tuple[float, ContactInstant] | None:
-        """Displacement of the object's middle along the weight's axis when the hand takes it [m], and the equilibrium
-        then; None where it does not."""
+        """Displacement of the handle along the axis of gravity when the hand takes the object [m], and the equilibrium
+        then; None if the hand does not hold it."""
         lowered = self.lowered.get(grip)
         if lowered is None or lowered.outcome is not TrialOutcome.HELD:
             return None
@@ -150,8 +152,8 @@ class WeightTrials(ABC):
         return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope, loaded, pressed)
 
     def _rate(self, grip: float) -> float | None:
-        """How fast the forces between hand and object grow with the grip, as a share of them, before the weight is on;
-        None where that is not known."""
+        """Logarithmic derivative of the contact force between hand and object with respect to the grip, before the
+        weight acts; None if not known."""
         closed = self.closed(grip)
         if not (closed.converged and self.weight.force(closed.last) > 0.0):
             return None
@@ -161,21 +163,21 @@ class WeightTrials(ABC):
             return None
 
     def _predicted(self, grip: float) -> float | None:
-        """How far the object sank at the nearest grip that held it."""
+        """Descent of the object at the nearest grip that held it [m]; None if none did."""
         held = [one for one, lowered in self.lowered.items() if lowered.outcome is TrialOutcome.HELD]
         near = min(held, key=lambda one: abs(one - grip), default=None)
         return None if near is None else self.lowered[near].sunk
 
 
 class HandTrials(WeightTrials):
-    """Grips of a hand on an object of a simulation, which stands on its support.
+    """Trial grips of a simulated hand on an object that stands on its support.
 
     Args:
-        squeeze: The hand.
+        squeeze: The closing hand.
         one: The object, with its support.
 
     Raises:
-        InputError: An object without a weight, or gravity along no axis.
+        InputError: An object without weight, or gravity not along one axis.
     """
 
     def __init__(self, squeeze: Squeeze, one: ObjectBody) -> None:
@@ -188,42 +190,42 @@ class HandTrials(WeightTrials):
         super().__init__(weight, model.body, model.pairs)
 
     def closed(self, grip: float) -> ContactSolution:
-        """Joints flexed by the grip."""
+        """Equilibrium with the joints flexed by the grip."""
         return self.squeeze.closed(grip)
 
     def held(self, grip: float) -> NDArray[np.int64]:
-        """Those of the hand, and of all other bodies."""
+        """Prescribed degrees of freedom of all bodies but the object."""
         squeeze, span = self.squeeze, self._span
         known = squeeze.model.prescribed(squeeze.time, squeeze.history).degrees
         return np.asarray(known[(known < 3 * span.start) | (known >= 3 * span.stop)])
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
-        """Joints that flex on, all alike."""
+        """Tangent for all joints flexing at the same rate."""
         return self.squeeze.tangent(grip, closed)
 
     def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
-        """The points it stands on let go, all but the height of its middle."""
+        """Equilibrium after the reactions of the support points are ramped down, with the handle's height fixed."""
         there = self._at(self.weight.height(closed.last))
         forces = np.zeros_like(closed.last.reactions)
         forces[self._span] = closed.last.reactions[self._span]
         return self._branch(grip, closed, lambda share: there, _FADING, nodal=lambda share: (1.0 - share) * forces)
 
     def moved(self, grip: float, after: ContactSolution, height: float) -> ContactSolution:
-        """Its middle at another height."""
+        """Equilibrium with the handle at another height [m]."""
         since = self.weight.height(after.last)
         return self._branch(grip, after, lambda share: self._at(since + share * (height - since)), 0)
 
     def released(self, grip: float, after: ContactSolution) -> ContactSolution:
-        """Held by nothing but the hand."""
+        """Equilibrium with the object held by the hand alone."""
         return self._branch(grip, after, lambda share: _NOTHING, _LETTING_GO)
 
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
-        """Of the hand's muscles."""
+        """Largest load share of the hand's muscles, and its digit."""
         most = max(self.squeeze.effort(grip, instant).digits, key=lambda digit: digit.share)
         return most.share, most.digit
 
     def beneath(self, instant: ContactInstant) -> str:
-        """What else bears the object, and how much."""
+        """Message about what else bears the object; empty if nothing does."""
         out = []
         for owner, touch in zip(self.squeeze.model.owners, instant.touches, strict=True):
             other = owner.other(self._one.name)
@@ -241,13 +243,12 @@ class HandTrials(WeightTrials):
         halvings: int,
         nodal: Callable[[float], NDArray[np.float64]] | None = None,
     ) -> ContactSolution:
-        """After another equilibrium, the hand as it is at a grip and this prescribed of the object."""
+        """Equilibrium in one step after another, with the hand fixed at a grip and given conditions of the object."""
         model, history = self.squeeze.model, self.squeeze.history
-        moves = self.squeeze.stays(grip)
-        known_of_it = (self._one.name, known)
-        return solve_branch(model, history, after, 1, moves=moves, known=known_of_it, nodal=nodal, halvings=halvings)
+        moves, conditions = self.squeeze.stays(grip), (self._one.name, known)
+        return solve_branch(model, history, after, 1, moves=moves, known=conditions, nodal=nodal, halvings=halvings)
 
     def _at(self, height: float) -> Prescribed:
-        """The handle at a height, in the object's own numbering."""
+        """Dirichlet condition of the handle's height, in the object's own node numbering."""
         there = self.weight.at(height)
         return Prescribed(there.degrees - 3 * self._span.start, there.values)

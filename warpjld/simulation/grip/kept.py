@@ -1,4 +1,4 @@
-"""Grips that were found, as plain values for a state file and back."""
+"""Conversion of grip results to plain values for a checkpoint, and back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["grip_content", "restored_grip"]
 
 
 def grip_content(found: FoundGrip) -> dict[str, Any]:
-    """As plain values; what was asked is named by the frame at which it begins."""
+    """A grip result as plain values; its specification is identified by the first frame."""
     content = {one.name: getattr(found, one.name) for one in fields(found) if one.name != "request"}
     release = None if found.release is None else asdict(found.release)
     edits = [asdict(edit) for edit in found.edits]
@@ -23,14 +23,14 @@ def grip_content(found: FoundGrip) -> dict[str, Any]:
 
 
 def restored_grip(content: Mapping[str, Any], contact: ContactSpecification) -> FoundGrip:
-    """What ``grip_content`` gave.
+    """Grip result from the values of ``grip_content``.
 
     Raises:
-        InputError: Nobody asked for such a grip.
+        InputError: The specification has no grip that begins at that frame.
     """
     request = next((grip for grip in contact.grips if grip.first == content["first"]), None)
     if request is None:
-        raise InputError(f"it holds a grip at frame {content['first']}, for which nobody asks")
+        raise InputError(f"it holds a grip at frame {content['first']}, which is not in the specification")
     rest = {name: value for name, value in content.items() if name != "first"}
     rest["edits"] = tuple(AngleEdit(**edit) for edit in rest["edits"])
     rest["release"] = None if rest["release"] is None else SupportRelease(**rest["release"])

@@ -1,8 +1,8 @@
-"""Lowering: an object goes down into a hand until the hand bears all of its weight, or is seen not to (R122–R124).
+"""Displacement-controlled lowering of an object into a hand until the hand bears its weight or cannot (R122–R124).
 
-With a force on the object there is no equilibrium beyond what friction bears, and a solver that finds none has not
-proved it. With the height of the object's middle prescribed there is one at every height: what its handle bears there
-is measured, and that the hand bears no more however deep the object sinks is found and not guessed.
+Under force control there is no equilibrium beyond the capacity of friction, and a solver that finds none has proved
+nothing. With the height of the object's handle prescribed there is an equilibrium at every height: the reaction of the
+handle is the weight not yet borne, and whether the hand bears more as the object sinks is measured.
 """
 
 from __future__ import annotations
@@ -19,47 +19,51 @@ from warpjld.simulation.grip.shared_weight import SharedWeight
 __all__ = ["Lowering", "lower_object"]
 
 _FIRST = 1.0 / 240.0
-"""First step down, over the object's height, and how much longer the next may be."""
+"""Default first step down, over the object's height."""
 _LONGER = 2.5
+"""Largest ratio of successive steps."""
 _FAR, _LONGEST = 0.25, 0.25
-"""An object that sinks by this share of its height is not held; and part of that way that one step may be long."""
+"""Descent, over the object's height, at which it counts as not held; and the longest step, over that descent."""
 _MOST = 14
-"""Steps."""
+"""Most equilibria with the handle."""
 _PART, _BOUNDS = 0.5, (_FIRST, 0.06)
-"""Part of the way that is predicted to take in one step, and bounds of this step, over the object's height."""
+"""Fraction of a descent known from another grip taken in the first step, and bounds of that step, over the object's
+height."""
 _ALMOST = 0.9
-"""Part of the way that the tangent foresees to take in the first step."""
+"""Fraction of the descent predicted by the tangent taken in the first step."""
 _AGAIN = 0.6
-"""Part of a step that found no equilibrium that later ones may be long: what fails costs most."""
+"""Bound on later steps, over the length of a step without equilibrium: failures cost most."""
 _SHORTER, _TRIES = 1.0 / 3.0, 3
-"""What becomes of a step that finds no equilibrium, and how many are tried."""
+"""Factor on a step without equilibrium, and number of attempts."""
 _LEFT, _LITTLE = 0.01, 0.001
-"""Share of the weight that may be left on the handle when it lets go; and the same where that was too much."""
+"""Share of the weight on the handle at which it is released; and the share tried next if that failed."""
 _SPARE = 0.002
-"""Share of the weight that is to be borne beyond all of it where all slides: nothing may be left then."""
+"""Share of the weight to be borne in excess of all of it where every point slides, as nothing may be left then."""
 _LESS = 0.02
-"""Share of the weight that the hand may bear less than it did before the object is said to slip out."""
+"""Drop of the borne share of the weight from its maximum at which the object counts as slipping out."""
 _TOO_FAR = 0.1
-"""Share of the weight that the hand may bear beyond all of it before a step is taken again, and shorter: friction
-remembers, and does not let an object rise to where it would have stayed."""
+"""Share of the weight borne in excess above which a step is repeated shorter: friction depends on history, and an
+object lowered too far does not rise back."""
 _CLEARLY = 0.9
-"""Share of the weight that pressures under it must be able to bear for the descent to go on, if they do not grow."""
+"""Share of the weight that friction must be able to bear with the pressures for the descent to go on, unless they
+grow."""
 _PROBE = 0.05
-"""Step once all slides, over ``far``: long enough to see whether more will be borne."""
+"""Step once every point slides, over ``far``: long enough to measure whether more will be borne."""
 _ALL = 1.0 - 1e-9
+"""Share of the contact area that slides from which on all of it counts as sliding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lowering:
-    """How a descent ended.
+    """Result of a descent.
 
     Attributes:
-        outcome: How.
-        solution: The last equilibrium: where the object is held, the one that nothing but the hand holds.
-        instants: All equilibria after the one it began with, in order.
-        borne: Largest share of the weight that the hand bore on the way; what it could bear where it holds.
-        sunk: How far it sank [m].
-        path: How far it had sunk [m] and which share the hand bore, at every equilibrium with the handle.
+        outcome: How it ended.
+        solution: Last equilibrium; if the object is held, that without the handle.
+        instants: All equilibria after the initial one, in order.
+        borne: Largest share of the weight that the hand bore; if it holds, the share that it could bear.
+        sunk: Total descent [m].
+        path: Descent [m] and share of the weight borne by the hand, at every equilibrium with the handle.
     """
 
     outcome: TrialOutcome
@@ -71,8 +75,17 @@ class Lowering:
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
-    """An equilibrium with the handle: shares of the weight, and how far the object has sunk [m]."""
+class _Lowered:
+    """An equilibrium with the handle.
+
+    Attributes:
+        solution: The equilibrium.
+        sunk: Descent so far [m].
+        left: Share of the weight borne by the handle.
+        elsewhere: Share of the weight borne by other bodies than the hand.
+        slides: Whether every contact point slides.
+        most: Share of the weight that friction could bear with the pressures.
+    """
 
     solution: ContactSolution
     sunk: float
@@ -83,7 +96,7 @@ class _Place:
 
     @property
     def borne(self) -> float:
-        """By the hand."""
+        """Share of the weight borne by the hand."""
         return 1.0 - self.left - self.elsewhere
 
 
@@ -96,45 +109,45 @@ def lower_object(
     predicted: float | None = None,
     rate: Callable[[ContactSolution], float | None] = lambda after: None,
 ) -> Lowering:
-    """Lower the handle until nothing is left on it, then let go.
+    """Lower the handle until its reaction vanishes, then release it.
 
-    How deep to go, the tangent says (``rate``), then the chord, as friction gives way.
+    Steps are chosen by the tangent (``rate``) first, and by the secant afterwards.
 
     Args:
-        weight: Of the object.
+        weight: Weight of the object, shared by hand and handle.
         bare: Equilibrium in which the handle bears what the hand does not.
         moved: Equilibrium after another, with the handle at a height [m].
         released: Equilibrium after another, without the handle.
-        predicted: How far it sank at a grip like this one [m].
-        rate: How much more of the weight the hand bears per metre that the object sinks from an equilibrium with the
-            handle; None where that is not known.
+        predicted: Descent at a similar grip [m]; None if not known.
+        rate: Derivative of the share of the weight borne by the hand with respect to the descent [1/m], at an
+            equilibrium with the handle; None if not known.
     """
-    way = _Way(weight, bare, moved)
-    first = _first(weight, way.places[0], predicted, rate)
+    descent = _Descent(weight, bare, moved)
+    first = _first(weight, descent.places[0], predicted, rate)
     step, enough = first * weight.tall, _LEFT
-    while len(way.places) < _MOST:
-        here = way.places[-1]
-        outcome = _outcome(weight, way.places, way.far)
+    while len(descent.places) < _MOST:
+        here = descent.places[-1]
+        outcome = _outcome(weight, descent.places, descent.far)
         if outcome is not None:
-            return way.ended(outcome)
+            return descent.ended(outcome)
         if here.left <= (0.0 if here.slides else enough):
             free = released(here.solution)
             if free.converged:
-                return way.ended(TrialOutcome.HELD, free)
+                return descent.ended(TrialOutcome.HELD, free)
             if here.left <= _LITTLE:
                 break
             enough = _LITTLE
-        ahead = way.onward(here, _step(way.places, step, way.far))
+        ahead = descent.onward(here, _step(descent.places, step, descent.far))
         if ahead is None:
             break
         step = ahead.sunk - here.sunk
-        way.places.append(ahead)
-    return way.ended(TrialOutcome.UNSOLVED)
+        descent.places.append(ahead)
+    return descent.ended(TrialOutcome.UNSOLVED)
 
 
 def _first(
     weight: SharedWeight,
-    here: _Place,
+    here: _Lowered,
     predicted: float | None,
     rate: Callable[[ContactSolution], float | None],
 ) -> float:
@@ -147,8 +160,8 @@ def _first(
     return float(np.clip(_ALMOST * here.left / slope / weight.tall, *_BOUNDS))
 
 
-class _Way:
-    """Places that the object went through on its way down."""
+class _Descent:
+    """Equilibria of an object that is lowered."""
 
     def __init__(
         self,
@@ -161,15 +174,15 @@ class _Way:
         self.places = [self._place(bare)]
         self._longest = np.inf
 
-    def _place(self, solution: ContactSolution) -> _Place:
+    def _place(self, solution: ContactSolution) -> _Lowered:
         there = solution.last
         sunk = self._weight.sunk(self._begin, self._weight.height(there))
         slides = self._weight.sliding(there) >= _ALL
         left, elsewhere, most = self._weight.left(there), self._weight.elsewhere(there), self._weight.most(there)
-        return _Place(solution, sunk, left, elsewhere, slides, most)
+        return _Lowered(solution, sunk, left, elsewhere, slides, most)
 
-    def onward(self, here: _Place, step: float) -> _Place | None:
-        """Deeper by a step [m], or by less where that finds no equilibrium or goes too far."""
+    def onward(self, here: _Lowered, step: float) -> _Lowered | None:
+        """Lower by a step [m], or by less if that has no equilibrium or goes too far; None if all attempts fail."""
         ahead, step = None, min(step, self._longest)
         for _ in range(_TRIES):
             height = self._weight.lower(self._weight.height(here.solution.last), step)
@@ -185,7 +198,7 @@ class _Way:
         return ahead
 
     def ended(self, outcome: TrialOutcome, free: ContactSolution | None = None) -> Lowering:
-        """How it went; ``free`` is the equilibrium without the handle."""
+        """Result with an outcome; ``free`` is the equilibrium without the handle, if there is one."""
         last = free or self.places[-1].solution
         borne = max(one.borne for one in self.places)
         if free is not None:
@@ -196,8 +209,8 @@ class _Way:
         return Lowering(outcome, last, (*instants, *(free.instants if free else ())), borne, sunk, path)
 
 
-def _outcome(weight: SharedWeight, places: list[_Place], far: float) -> TrialOutcome | None:
-    """Whether it can be seen that the hand does not hold the object."""
+def _outcome(weight: SharedWeight, places: list[_Lowered], far: float) -> TrialOutcome | None:
+    """Outcome if the hand evidently does not hold the object; None to continue."""
     here = places[-1]
     if here.elsewhere > _LEFT:
         return TrialOutcome.STANDS
@@ -214,8 +227,8 @@ def _outcome(weight: SharedWeight, places: list[_Place], far: float) -> TrialOut
     return TrialOutcome.SANK if here.sunk > far else None
 
 
-def _step(places: list[_Place], step: float, far: float) -> float:
-    """How much deeper to go, after a step [m]."""
+def _step(places: list[_Lowered], step: float, far: float) -> float:
+    """Next step down, given the last one [m]."""
     here = places[-1]
     if len(places) == 1:
         return step
@@ -225,13 +238,13 @@ def _step(places: list[_Place], step: float, far: float) -> float:
     return min((here.left + _SPARE * here.slides) / slope, longest) if slope > 0.0 else longest
 
 
-def _presses(places: list[_Place]) -> float:
-    """How much more of the weight pressures could bear for each metre that the object sank last, 0 or more."""
+def _presses(places: list[_Lowered]) -> float:
+    """Increase of the share that friction could bear per descent in the last step [1/m], at least 0."""
     before, here = places[-2:]
     return max((here.most - before.most) / (here.sunk - before.sunk), 0.0)
 
 
-def _slope(places: list[_Place]) -> float:
-    """How much more of the weight the hand bears for each metre that the object sank last."""
+def _slope(places: list[_Lowered]) -> float:
+    """Increase of the share borne by the hand per descent in the last step [1/m]."""
     before, here = places[-2:]
     return (here.borne - before.borne) / (here.sunk - before.sunk)

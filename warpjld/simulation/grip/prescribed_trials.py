@@ -1,4 +1,4 @@
-"""Grips of any bodies in contact, without a hand: what is prescribed of them closes on an object (R122–R124)."""
+"""Trial grips of arbitrary bodies whose Dirichlet conditions close on an object, without a hand (R122–R124)."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from warpjld.simulation.grip.shared_weight import SharedWeight
 __all__ = ["PrescribedTrials"]
 
 _COMES_ON = 2
-"""How often the step in which a weight comes on may be halved."""
+"""Most halvings of the load step that applies the weight."""
 _STEP = 1e-3
-"""Of the differences in what is prescribed, over the grip."""
+"""Step of the finite difference of the prescribed displacements, relative to the grip."""
 
 
 class PrescribedTrials(WeightTrials):
-    """Grips of any bodies in contact that are measured by what is prescribed of them: a way [m], an angle [rad], ….
+    """Trial grips parametrised by prescribed displacements: a distance [m], an angle [rad], ….
 
-    A grip closes without gravity in proportion to time from 0 to 1, which keeps the object where the hand meets it; the
-    weight comes on at 2 while the handle keeps its height, and every step down takes one more.
+    A grip closes in proportion to time from 0 to 1 without gravity, so that the object stays in place; the weight is
+    applied until time 2 with the handle's height fixed, and every step down takes one unit of time.
 
     Args:
         body: Hand and object, merged.
-        prescribed: Known displacements of a grip; at 0 nothing is displaced.
-        pairs: What holds the object, and nothing else.
-        name: Of the object's region.
-        gravity: Along one axis [m/s²].
-        loads: What else acts from the start, as the pressure inside an object.
-        others: What else the object may touch: what they bear, the hand does not hold.
-        share: Largest share of the muscles' limits at an instant, and who has it.
+        prescribed: Dirichlet conditions of a grip; zero at grip 0.
+        pairs: Contact pairs that hold the object.
+        name: Region of the object.
+        gravity: Acceleration along one axis [m/s²].
+        loads: Loads that act from the start, as the pressure inside an object.
+        others: Contact pairs of the object with other bodies; what these bear, the hand does not hold.
+        share: Largest load share of the muscles at an instant, and who has it.
 
     Raises:
-        InputError: No pairs, no such object, or gravity along no axis.
+        InputError: No pairs, no such object, or gravity not along one axis.
     """
 
     def __init__(
@@ -72,17 +72,17 @@ class PrescribedTrials(WeightTrials):
         super().__init__(SharedWeight(body, own, touching, range(len(pairs)), gravity), body, touching)
 
     def closed(self, grip: float) -> ContactSolution:
-        """What is prescribed of the grip is reached, without gravity."""
+        """Equilibrium at the grip without gravity."""
         if grip not in self._closed:
             self._closed[grip] = self._press(lambda time: self._at(grip, time), self._loads, 1.0)
         return self._closed[grip]
 
     def held(self, grip: float) -> NDArray[np.int64]:
-        """Those of the grip."""
+        """Prescribed degrees of freedom of the grip."""
         return np.asarray(self._at(grip, 1.0).degrees)
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
-        """What is prescribed goes on in proportion."""
+        """Tangent for a change of the grip."""
         known, step = self._at(grip, 1.0), _STEP * max(grip, 1e-9)
         change = np.zeros(self.body.degrees)
         change[known.degrees] = (self._at(grip + step, 1.0).values - known.values) / step
@@ -90,19 +90,19 @@ class PrescribedTrials(WeightTrials):
         return tangent, Perturbation(prescribed=change)
 
     def bared(self, grip: float, closed: ContactSolution) -> ContactSolution:
-        """The weight comes on, and the handle keeps its height."""
+        """Equilibrium under the weight, with the handle's height fixed."""
         return self._lowered(grip, closed, self.weight.height(closed.last), halvings=_COMES_ON)
 
     def moved(self, grip: float, after: ContactSolution, height: float) -> ContactSolution:
-        """The handle at another height under the whole weight."""
+        """Equilibrium under the weight, with the handle at another height [m]."""
         return self._lowered(grip, after, height)
 
     def released(self, grip: float, after: ContactSolution) -> ContactSolution:
-        """The whole weight without a handle."""
+        """Equilibrium under the weight without the handle."""
         return self._lowered(grip, after, None)
 
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
-        """As the caller measures it; none where nothing touches."""
+        """Load share by the caller's function; 0 without contact."""
         return self._share(instant) if self._share is not None and instant.touches else (0.0, "")
 
     def _at(self, grip: float, time: float) -> Prescribed:

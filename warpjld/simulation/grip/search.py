@@ -1,14 +1,14 @@
-"""The gentlest grip that holds: force raised until nothing slides, or a reason why none holds (R123, R124).
+"""Search for the smallest grip that holds an object, or the reason why none does (R123, R124).
 
-A trial holds or it does not. What is searched for is a capacity: the share of the weight that friction could bear with
-a trial's pressures, were all of it to point up. It rises with the grip, smoothly, and the tangent says how fast
-(``Bracket``). Two pads beside a block hold it from a capacity of 1 on. Other grips need more, as friction also balances
-moments, or digits that push against one another: where a trial with a capacity m slides and bears a share b < 1, m / b
-is aimed at next.
+A trial holds or not, which is no smooth function of the grip. The search uses the capacity instead: the share of the
+weight that friction could bear with the pressures of the trial if all of it pointed up. It increases smoothly with the
+grip, and its slope is known from the tangent (``Bracket``). Two pads beside a block hold it from a capacity of 1 on.
+Other grips need more, since friction also balances moments and opposing digits: after a trial with capacity m that
+slides and bears a share b < 1, the target becomes m / b.
 
-While friction can carry no more than a few times the weight, sliding may mean that the grip is too gentle; above it,
-sliding by a share that a doubled force does not change means that the forces pull out of their friction cones, and no
-grip at these places will hold.
+As long as friction can carry only a few times the weight, sliding may mean that the grip is too small. Beyond that, a
+sliding share that does not change when the force doubles means that contact forces cannot lie in their friction cones,
+and no grip at these contacts holds.
 """
 
 from __future__ import annotations
@@ -26,14 +26,16 @@ from warpjld.simulation.grip.bracket import Bracket, checked_step
 __all__ = ["Grip", "GripStatus", "Trial", "TrialOutcome", "gentlest_grip"]
 
 _SAME = 0.02
+"""Difference of sliding shares that counts as none; also the width of a bracket, relative to the tolerance, at which
+the search ends."""
 _AMPLE = 4.0
-"""Friction this many times the weight is not what is missing."""
+"""Ratio of available friction to weight above which more force would not help."""
 _TRIALS = 24
-"""Grips tried at most: where slopes are known, three or four are enough."""
+"""Most grips tried; with slopes three or four are enough."""
 
 
 class TrialOutcome(Enum):
-    """How a trial ended; the value is what is said of one or several."""
+    """How a trial ended; the value completes a message about one or several trials."""
 
     HELD = "held"
     APART = "pressed on nothing"
@@ -46,10 +48,11 @@ class TrialOutcome(Enum):
 
 
 _NO_MATTER_OF_FORCE = (TrialOutcome.STANDS, TrialOutcome.UNSOLVED)
+"""Outcomes that do not depend on the force."""
 
 
 class GripStatus(Enum):
-    """How a search for a grip ended; the value is the message for people."""
+    """How a search for a grip ended; the value is the message."""
 
     HELD = "held: the gentlest grip was found"
     HELD_AT_ONCE = "held by the gentlest grip that was allowed"
@@ -64,21 +67,21 @@ class GripStatus(Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """What one grip does.
+    """Result of trying one grip.
 
     Attributes:
-        outcome: How it ended.
-        sliding: Share of the contact that slides, 0 … 1; NaN where nothing touches.
+        outcome: How the trial ended.
+        sliding: Share of the contact area that slides, 0 … 1; NaN without contact.
         force: Sum of the normal forces on the object [N].
-        borne: Share of the weight that the hand bore at most, or could have; NaN where it is not known.
-        share: Largest share of the muscles' limits, 0 where it is not measured.
-        who: Digit that has this share.
-        note: More for people, as what the object stands on.
-        capacity: Share of the weight that friction could bear with its pressures, were all of it to point up; NaN where
-            it is not known: ``borne`` counts then.
-        slope: Derivative of the capacity by the grip, where it is known.
-        loaded: Whether pressures were those under the weight, not those before.
-        pressed: Sum of the normal forces on the object before the weight came on [N]; NaN where it is not known.
+        borne: Largest share of the weight that the hand bore or could have borne; NaN if not known.
+        share: Largest load share (load over limit) of the muscles; 0 if not measured.
+        who: Digit with that share.
+        note: Addition to messages, as what the object stands on.
+        capacity: Share of the weight that friction could bear with the pressures if all of it pointed up; NaN if not
+            known (``borne`` is used then).
+        slope: Derivative of the capacity with respect to the grip; None if not known.
+        loaded: Whether the pressures are those under the weight.
+        pressed: Sum of the normal forces on the object before the weight acted [N]; NaN if not known.
     """
 
     outcome: TrialOutcome
@@ -95,25 +98,25 @@ class Trial:
 
     @property
     def able(self) -> float:
-        """The capacity, or what was borne where that is not known."""
+        """The capacity; ``borne`` if it is not known."""
         return self.borne if np.isnan(self.capacity) else self.capacity
 
     @property
     def held(self) -> bool:
-        """Whether the hand, and nothing else, holds the weight."""
+        """Whether the hand alone holds the weight."""
         return self.outcome is TrialOutcome.HELD
 
 
 @dataclass(frozen=True)
 class Grip:
-    """The gentlest grip, or the last one tried.
+    """The smallest grip found, or the last one tried.
 
     Attributes:
         status: How the search ended.
-        grip: Its measure, as handed to ``hold`` (an angle, a force, a share of closing).
-        trial: What it does.
+        grip: Grip, the argument of ``hold`` (an angle, a force, a share of closing).
+        trial: Its trial.
         trials: Every grip tried, in order.
-        text: For people.
+        text: Summary in one line.
     """
 
     status: GripStatus
@@ -124,7 +127,7 @@ class Grip:
 
     @property
     def ended(self) -> str:
-        """How the trials ended, with the number of each: "5 grips were tried: 2 held, 3 slid at every point"."""
+        """Numbers of trials by outcome: "5 grips were tried: 2 held, 3 slid at every point"."""
         count = Counter(trial.outcome for _, trial in self.trials)
         parts = ", ".join(f"{count[outcome]} {outcome.value}" for outcome in TrialOutcome if count[outcome])
         return f"{len(self.trials)} grip{'s were' if len(self.trials) > 1 else ' was'} tried: {parts}"
@@ -141,25 +144,25 @@ def gentlest_grip(
     tolerance: float = 0.02,
     most: int = _TRIALS,
 ) -> Grip:
-    """The smallest grip in low … high that holds.
+    """Smallest grip in ``low`` … ``high`` that holds.
 
-    A trial that could not be solved says nothing; the search goes on beside it, and counts it.
+    A trial that could not be solved is no information; the search goes on next to it, and counts it.
 
     Args:
-        hold: What a grip does.
-        low: Gentlest grip allowed, below which nothing is tried.
-        high: Firmest grip allowed.
-        weight: What is to be held [N].
+        hold: Trial of a grip.
+        low: Smallest grip allowed.
+        high: Largest grip allowed.
+        weight: Weight to hold [N].
         friction: Coulomb's μ between hand and object.
-        start: First step above ``low`` where nothing is touched, by default a sixteenth of the range.
-        tolerance: How near to the gentlest, as a share of the force.
-        most: Trials; after that the gentlest that held is given.
+        start: First step above ``low`` without contact; by default a sixteenth of the range.
+        tolerance: Tolerance of the smallest grip, relative to the force.
+        most: Most trials; after that the smallest grip that held is returned.
 
     Returns:
-        What was tried until then with ``GripStatus.INTERRUPTED``, where Ctrl-C ends it.
+        The grip found; if Ctrl-C ends the search, the trials so far with ``GripStatus.INTERRUPTED``.
 
     Raises:
-        InputError: A range that is none.
+        InputError: An argument out of range.
     """
     step = checked_step(low, high, start)
     if not 0.0 < tolerance < 1.0:
@@ -175,7 +178,7 @@ def gentlest_grip(
 
 
 class _Search:
-    """Grips tried so far."""
+    """State of the search: bracket and trials so far."""
 
     def __init__(self, hold: Callable[[float], Trial], bracket: Bracket, tolerance: float) -> None:
         self._hold, self._bracket, self._tolerance = hold, bracket, tolerance
@@ -201,14 +204,14 @@ class _Search:
         return self.best(_at_last(self.trials[-1][1]))
 
     def best(self, otherwise: GripStatus) -> Grip:
-        """The gentlest that held, or the last one tried, which ended so."""
+        """The smallest grip that held; if none did, the last one tried, with the status ``otherwise``."""
         held = [one for one in self.trials if one[1].held]
         if held:
             return self._ended(GripStatus.HELD, *min(held, key=lambda one: one[0]))
         return self._ended(otherwise, *self.trials[-1])
 
     def interrupted(self) -> Grip:
-        """What was tried until now."""
+        """Result with the trials so far."""
         if not self.trials:
             nothing = Trial(TrialOutcome.UNSOLVED, float("nan"), 0.0)
             return Grip(GripStatus.INTERRUPTED, self._bracket.low, nothing, (), GripStatus.INTERRUPTED.value)
@@ -216,23 +219,23 @@ class _Search:
 
     def _note(self, grip: float, trial: Trial) -> None:
         if trial.loaded and not any(one.loaded for _, one in self.trials[:-1]):
-            self._bracket.distrust()  # pressures before the weight came on
-        if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # it takes more than friction's sum
+            self._bracket.distrust()  # earlier capacities are those before the weight acted
+        if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # a capacity of 1 is not enough
             self._bracket.target = self._aim * trial.able / trial.borne
         self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
 
     def _near(self, trial: Trial) -> bool:
-        """Whether little less would not hold any more, by all that is known."""
+        """Whether the capacity exceeds the target by no more than the tolerance."""
         return trial.able <= self._bracket.target / self._aim * (1.0 + self._tolerance)
 
     def _narrow(self) -> bool:
-        """Whether a grip that does not hold is near enough."""
+        """Whether the bracket is narrower than the tolerance."""
         below, above = self._bracket.below, self._bracket.above
         if below is None or above is None:
             return False
         pressed = {grip: trial.pressed for grip, trial in self.trials}
         firmer, gentler = pressed[above.grip], pressed[below.grip]
-        if 0.0 < gentler <= firmer:  # says the same of grips that hold and those that do not
+        if 0.0 < gentler <= firmer:  # comparable whether a grip holds or not
             return firmer <= (1.0 + self._tolerance) * gentler
         share = self._bracket.width / (above.grip - self._bracket.low)
         if 0.0 < below.value < above.value:
@@ -246,7 +249,7 @@ class _Search:
 
 
 def _given_up(trials: list[tuple[float, Trial]], last: bool, needed: float) -> GripStatus | None:
-    """Why nothing firmer is tried after a grip that does not hold."""
+    """Status if no larger grip has to be tried after one that does not hold; None to continue."""
     trial = trials[-1][1]
     if trial.share > 1.0:
         return GripStatus.TOO_WEAK
@@ -256,7 +259,7 @@ def _given_up(trials: list[tuple[float, Trial]], last: bool, needed: float) -> G
 
 
 def _at_last(trial: Trial) -> GripStatus:
-    """Why the firmest grip does not hold."""
+    """Status if the last grip does not hold."""
     known = {TrialOutcome.UNSOLVED: GripStatus.NO_SOLUTION, TrialOutcome.STANDS: GripStatus.STANDS}
     if trial.outcome in known:
         return known[trial.outcome]
@@ -264,7 +267,7 @@ def _at_last(trial: Trial) -> GripStatus:
 
 
 def _slides_for_ever(trials: list[tuple[float, Trial]], needed: float) -> bool:
-    """Whether ample force was doubled and slid by the same share."""
+    """Whether the sliding share stayed the same while ample force was doubled."""
     if needed == np.inf:
         return len([t for _, t in trials if t.force > 0.0]) >= 3
     ample = [t for _, t in trials if t.force > _AMPLE * needed and t.outcome not in _NO_MATTER_OF_FORCE]

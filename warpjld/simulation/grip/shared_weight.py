@@ -1,7 +1,7 @@
-"""An object whose weight a hand and a handle share: what each of them bears (R122, R123).
+"""Distribution of an object's weight between a hand and a handle (R122, R123).
 
-The handle is one node in the object's middle whose height is prescribed and nothing else. What it bears is known from
-its reaction; what is left of the weight, the hand bears, or something else that the object stands on.
+The handle is a central node of the object whose displacement along the axis of gravity is prescribed. Its reaction is
+the weight it bears; the hand, or another body the object stands on, bears the rest.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ class SharedWeight:
     Args:
         body: Hand and object, merged.
         nodes: The object's nodes, shape (n,).
-        pairs: All pairs of the contact problem.
-        holding: Numbers of those between hand and object.
-        gravity: Along one axis [m/s²].
+        pairs: All contact pairs.
+        holding: Indices of those between hand and object.
+        gravity: Acceleration along one axis [m/s²].
 
     Attributes:
-        weight: [N], above 0.
-        handle: Node in the middle.
-        axis: Of the weight, 0, 1 or 2.
-        tall: Extent along it [m].
+        weight: Weight of the object [N], above 0.
+        handle: Index of the handle node.
+        axis: Axis of gravity: 0, 1 or 2.
+        tall: Extent of the object along it [m].
 
     Raises:
-        InputError: Gravity along no axis or between axes, or an object without a weight.
+        InputError: Gravity not along one axis, or an object without weight.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class SharedWeight:
         self._friction = [pairs[k].friction for k in self._holding]
 
     def at(self, height: float) -> Prescribed:
-        """The handle at a height: its displacement along the axis [m]."""
+        """Dirichlet condition of the handle: its displacement along the axis [m]."""
         return Prescribed(np.array([3 * self.handle + self.axis]), np.array([height]))
 
     def height(self, instant: ContactInstant) -> float:
@@ -80,19 +80,19 @@ class SharedWeight:
         return float(instant.displacement[self.handle, self.axis])
 
     def lower(self, height: float, by: float) -> float:
-        """A height that lies deeper by so much [m]."""
+        """Height reduced by a descent ``by`` [m] in the direction of gravity."""
         return height + self._down * by
 
     def sunk(self, since: float, height: float) -> float:
-        """How much deeper a height lies than another [m]."""
+        """Descent from one height to another [m]."""
         return self._down * (height - since)
 
     def left(self, instant: ContactInstant) -> float:
-        """Share of the weight that the handle bears."""
+        """Share of the weight borne by the handle."""
         return -self._down * float(instant.reactions[self.handle, self.axis]) / self.weight
 
     def elsewhere(self, instant: ContactInstant) -> float:
-        """Share of the weight that other things than the hand bear."""
+        """Share of the weight borne by other bodies than the hand."""
         others = (touch for k, touch in enumerate(instant.touches) if k not in self._holding)
         push = sum(float(touch.nodal[self._nodes, self.axis].sum()) for touch in others)
         return -self._down * push / self.weight
@@ -102,11 +102,11 @@ class SharedWeight:
         return sum(touch.normal_force for touch in self._touches(instant))
 
     def rate(self, tangent: EquilibriumTangent, change: Perturbation) -> float | None:
-        """How fast the normal forces between hand and object grow with a parameter, as a share of them; None where
-        there are none.
+        """Logarithmic derivative of the normal force between hand and object with respect to a parameter; None without
+        force.
 
         Raises:
-            SensitivityError: The equilibrium does not follow it.
+            SensitivityError: The equilibrium has no derivative.
         """
         pushed = float(tangent.pushed[self._holding][:, self._nodes].sum())
         if not pushed > 0.0:
@@ -114,10 +114,10 @@ class SharedWeight:
         return float(tangent.pushes(tangent.response(change))[self._holding][:, self._nodes].sum()) / pushed
 
     def relief(self, tangent: EquilibriumTangent) -> float:
-        """How much less of the weight the handle bears per metre that it goes down [1/m].
+        """Decrease of the share of the weight on the handle per descent [1/m].
 
         Raises:
-            SensitivityError: The equilibrium does not follow it.
+            SensitivityError: The equilibrium has no derivative.
         """
         down = np.zeros(tangent.free.size)
         down[3 * self.handle + self.axis] = self._down
@@ -125,25 +125,26 @@ class SharedWeight:
         return self._down * float(follows) / self.weight
 
     def sliding(self, instant: ContactInstant) -> float:
-        """Share of the contact that slides, 0 … 1; NaN where nothing touches."""
+        """Share of the contact area that slides, 0 … 1; NaN without contact."""
         touches = [touch for touch in self._touches(instant) if touch.contact_area > 0.0]
         area = sum(touch.contact_area for touch in touches)
         return sum(touch.sliding * touch.contact_area for touch in touches) / area if area > 0.0 else float("nan")
 
     def most(self, instant: ContactInstant) -> float:
-        """Share of the weight that friction and slant could bear with these pressures, were all of it to point up."""
+        """Capacity: share of the weight that these pressures and their full friction could bear, both pointing up as
+        far as the normals allow."""
         up = np.zeros(3)
         up[self.axis] = -self._down
         out = 0.0
         for touch, friction in zip(self._touches(instant), self._friction, strict=True):
             push = np.maximum(touch.pressure, 0.0) * touch.area
-            # normals point away from the slave: what touches it pushes the other way
+            # normals point outwards from the slave; the force on the slave points against them
             slant = np.clip(touch.normal @ up * np.where(self._mine[touch.nodes], -1.0, 1.0), -1.0, 1.0)
             out += float(push @ (slant + friction * np.sqrt(1.0 - slant**2)))
         return out / self.weight
 
     def used(self, instant: ContactInstant) -> float:
-        """Share of the friction that the pressures allow which acts, 0 … 1."""
+        """Mobilised friction: tangential force over μ times normal force, 0 … 1."""
         acts = allowed = 0.0
         for touch, friction in zip(self._touches(instant), self._friction, strict=True):
             along = np.einsum("mi,mi->m", touch.traction, touch.normal)

@@ -1,4 +1,4 @@
-"""A hand that closes on, joint by joint alike, from a frame that was solved (R123)."""
+"""Equilibria of a hand that closes further from a solved frame, all joints by the same angle (R123)."""
 
 from __future__ import annotations
 
@@ -24,25 +24,26 @@ from warpjld.skeleton.channels import FLEXION
 __all__ = ["TRAVEL", "Squeeze"]
 
 TRAVEL = 5e-4
-"""Way of a joint in one step [m]: longer ones make Newton's method stumble over friction."""
+"""Largest motion of a joint in one load step [m]: with longer ones Newton's method has trouble with friction."""
 
 _SAME = 1e-9
+"""Tolerance for equal grips [rad]."""
 
 
 class Squeeze:
-    """Grips: angles by which joints flex beyond where they are; each up to its limit.
+    """Equilibria by grip: the angle [rad] by which joints flex beyond their present flexion, each up to its limit.
 
     Args:
-        model: Everything.
-        history: What is known at that equilibrium.
-        hand: The hand that closes; its motion has angles.
-        joints: Those that flex, as the skeleton numbers them.
-        after: Equilibrium to begin at.
-        limits: Digit → largest force [N], where it is not the default.
+        model: The contact model.
+        history: History at the initial equilibrium.
+        hand: The hand that closes; it has to be driven by joint angles.
+        joints: Indices of the joints that flex.
+        after: Initial equilibrium.
+        limits: Digit → force limit that differs from the default [N].
 
     Attributes:
         model, history, hand: As given.
-        time: Of that equilibrium [frames].
+        time: Time of the initial equilibrium [frames].
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class Squeeze:
 
     @property
     def room(self) -> float:
-        """Grip at which the last joint comes to its limit [rad]."""
+        """Grip at which the last joint reaches its limit [rad]."""
         return float((self._high - self._start[self._joints, FLEXION]).max(initial=0.0))
 
     def angles(self, grip: float) -> NDArray[np.float64]:
@@ -73,25 +74,25 @@ class Squeeze:
         return out
 
     def closed(self, grip: float) -> ContactSolution:
-        """Equilibrium at a grip, gone to from the next gentler one that is known; its status says if it was found."""
+        """Equilibrium at a grip, reached from the largest known one below it; its status tells whether it was found."""
         if grip in self._closed:
             return self._closed[grip]
         before = max(known for known in self._closed if known <= grip + _SAME)
 
-        def on(share: float) -> Moves:
+        def moves(share: float) -> Moves:
             return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self.time)
 
-        steps = self.hand.bones.steps([(self.angles(one), self.time) for one in (before, grip)], TRAVEL)
-        found = solve_branch(self.model, self.history, self._closed[before], steps, moves=(self.hand.name, on))
+        steps = self.hand.bones.steps([(self.angles(end), self.time) for end in (before, grip)], TRAVEL)
+        found = solve_branch(self.model, self.history, self._closed[before], steps, moves=(self.hand.name, moves))
         if found.converged:
             self._closed[grip] = found
         return found
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
-        """Of the equilibrium at a grip, and what a firmer one changes [per rad].
+        """Tangent of the equilibrium at a grip, and the perturbation of the bones per rad of grip.
 
         Raises:
-            SensitivityError: No derivative.
+            SensitivityError: The equilibrium has no derivative.
         """
         model, time = self.model, self.time
         known = model.prescribed(time, self.history).degrees
@@ -99,13 +100,13 @@ class Squeeze:
         return EquilibriumTangent(model.body, model.pairs, closed, known, steadied=True), change
 
     def along(self, grip: float) -> NDArray[np.float64]:
-        """How the angles change with the grip, shape (J, 4): joints at their limits stay."""
+        """Derivative of the angles with respect to the grip, shape (J, 4); 0 for joints at their limits."""
         out = np.zeros_like(self._start)
         out[self._joints, FLEXION] = self._start[self._joints, FLEXION] + grip < self._high
         return out
 
     def slopes(self, grip: float, closed: ContactSolution) -> dict[str, DigitSlope] | None:
-        """How digits' efforts change with the grip [per rad]; None where that is not known."""
+        """Derivatives of the digits' efforts with respect to the grip [per rad]; None if not known."""
         bones, along, angles = self.hand.bones, self.along(grip), self.angles(grip)
         try:
             tangent, change = self.tangent(grip, closed)
@@ -118,12 +119,12 @@ class Squeeze:
             return None
 
     def stays(self, grip: float) -> tuple[str, Callable[[float], Moves]]:
-        """The hand as it is at a grip, for a branch."""
+        """Bone motion of a branch on which the hand stays at a grip."""
         there = self.hand.bones.moves_of(self.angles(grip), self.time)
         return self.hand.name, lambda share: there
 
     def effort(self, grip: float, instant: ContactInstant) -> Effort:
-        """What the muscles do at a grip."""
+        """Effort of the muscles at a grip."""
         poses = self.hand.bones.posed(self.angles(grip), self.time)
         return effort_at(self.model, self.hand, poses, instant, self._limits)
 

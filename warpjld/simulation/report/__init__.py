@@ -1,1 +1,1 @@
-"""What is told: the table, efforts of muscles, the verdict, tactile readings, volumes."""
+"""Evaluation of solved frames: contact table, muscle efforts, verdict, tactile readings, VTK volumes."""

@@ -1,4 +1,4 @@
-"""What an object is left with when all that touches it is added up: nothing, if a grasp holds it (R112)."""
+"""Force and moment balance of objects: the resultant of all contact forces, zero for a balanced grasp (R112)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame
 __all__ = ["ObjectBalance", "balances"]
 
 _OPPOSED = 0.1
-"""Share of what presses that has to meet a counterforce for an object to be grasped, and not merely pushed."""
+"""Share of the contact forces that has to be opposed for an object to count as grasped rather than pushed."""
 _SLIGHT = 0.1
-"""Forces below this are not told [N]."""
+"""Forces below this are not reported [N]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +24,14 @@ class ObjectBalance:
     """Contact forces on one object at one frame.
 
     Attributes:
-        object: Name.
-        frame: Number.
-        force: Their sum [N], shape (3,).
-        moment: About the centre of what presses [N m], shape (3,).
-        pressing: Sum of their sizes [N].
-        by_hands: Whether nothing but hands touches it or, by a HOLD or a support, keeps it in its place.
-        weight: What it may weigh [N].
-        borne: Whether something else holds it: its animation, HOLD, a support, or its own weight.
+        object: Name of the object.
+        frame: Frame number.
+        force: Resultant [N], shape (3,).
+        moment: Resultant moment about the force-weighted centre [N m], shape (3,).
+        pressing: Sum of the magnitudes of the nodal forces [N].
+        by_hands: Whether only hands touch it, and no HOLD or support constrains it.
+        weight: Assumed weight of a rigid object [N]; 0 for a deformable one.
+        borne: Whether something else balances a resultant: its animation, HOLD, a support, or gravity.
     """
 
     object: str
@@ -45,17 +45,17 @@ class ObjectBalance:
 
     @property
     def net(self) -> float:
-        """Size of ``force`` [N]."""
+        """Magnitude of the resultant [N]."""
         return float(np.linalg.norm(self.force))
 
     @property
     def grasped(self) -> bool:
-        """Whether hands press on it from several sides, and nothing else touches it."""
+        """Whether hands alone press on it, from several sides."""
         return self.by_hands and self.pressing > _SLIGHT and self.net < (1.0 - _OPPOSED) * self.pressing
 
     @property
     def unbalanced(self) -> bool:
-        """Whether a grasp pushes it away."""
+        """Whether it is grasped, and the resultant exceeds the allowed one."""
         return self.grasped and self.net > max(allowed_net(self.pressing, self.weight), _SLIGHT)
 
     @property
@@ -70,7 +70,7 @@ class ObjectBalance:
 
 
 def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
-    """Of every object that anything touches at a frame."""
+    """Balance of every object in contact at a frame."""
     hands = {hand.name for hand in model.hands}
     bodies = {one.name: one for one in model.objects}
     x = model.body.mesh.nodes + solved.displacement
@@ -83,7 +83,7 @@ def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
             if other is None or not nodal.any():
                 continue
             others.add(other)
-            # what presses on an obstacle is known by what it presses back with
+            # forces on an obstacle are the reactions to those on the nodes
             forces += _nodal_on(model, name, nodal) if name in bodies else -nodal
         size = np.linalg.norm(forces, axis=1)
         pressing = float(size.sum())
@@ -103,7 +103,7 @@ def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
 
 
 def _nodal_on(model: ContactModel, name: str, nodal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Forces (N, 3) on the nodes of one body, nothing on all others."""
+    """Forces (N, 3) on the nodes of one body, zero elsewhere."""
     out = np.zeros_like(nodal)
     out[model.spans[name]] = nodal[model.spans[name]]
     return out

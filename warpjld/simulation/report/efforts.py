@@ -1,16 +1,15 @@
-"""What contact puts on the bones of a hand and on its muscles, from an equilibrium (B eq. 8, R118).
+"""Loads on the bones of a hand and efforts of its muscles due to contact, from an equilibrium (B eq. 8, R118).
 
-Bones are held by reactions. Less those that hold the same hand in the same pose when nothing touches it
-(``FleshBody.alone``), they are what contact asks of the muscles. Contact of the hand's own skin, of two fingers, counts
-as contact: muscles press them together.
+The load of contact is the reactions at the bones minus those of the same hand in the same pose without contact
+(``FleshBody.alone``). Self-contact, as of two fingers, counts as contact: muscles press them together.
 
-Contact forces handed on to the bones by nearness (``loads_from_contact``) are near, and are what is left where the
-flesh alone finds no equilibrium. In ``examples/press_ball.jld`` they differ by less than 0.7 % in a digit's force,
-0.3 % in the torque about its base, 7 % about knuckle 2 and 3 to 7 % about knuckle 3, there a third at the thumb and
-the pinky, which are pressed beside that joint; for a fingertip on a plate by less than 0.01 %, 0.01 %, 0.1 % and 4 %;
-for a force beside the root of a finger, which finger and palm share, by 10 % in force and 17 % in torque. Reactions
-with what flesh alone takes would be off by 0.15 N a finger in that example, and by 5 N at the thumb of a hand whose
-flesh is at rest when it is flat.
+If the flesh alone has no equilibrium in the pose, contact forces are assigned to the nearest bones instead
+(``loads_from_contact``). In ``examples/press_ball.jld`` that differs by less than 0.7 % in a digit's force, 0.3 % in
+the torque about its base, 7 % about knuckle 2 and 3 to 7 % about knuckle 3, there by a third at the thumb and the
+pinky, which are pressed beside that joint; for a fingertip on a plate by less than 0.01 %, 0.01 %, 0.1 % and 4 %; for a
+force beside the root of a finger, which finger and palm share, by 10 % in force and 17 % in torque. Reactions without
+subtracting those of the flesh alone would be wrong by 0.15 N per finger in that example, and by 5 N at the thumb of a
+hand whose flesh is stress-free when flat.
 """
 
 from __future__ import annotations
@@ -39,17 +38,17 @@ def effort_at(
     found: SolvedFrame | ContactInstant,
     limits: Mapping[str, float] | None = None,
 ) -> Effort:
-    """Compare what contact puts on the bones with what muscles can do.
+    """Efforts of a hand's muscles due to contact, relative to their limits.
 
-    Where the flesh alone finds no equilibrium, contact forces are handed on to the bones by nearness instead, and the
-    digits' ``flesh`` is NaN.
+    If the flesh alone has no equilibrium, contact forces are assigned to the nearest bones, and the digits' ``flesh``
+    is NaN.
 
     Args:
-        model: Everything.
-        hand: Whose.
-        poses: One pose of it.
-        found: The equilibrium in that pose.
-        limits: Digit → largest force [N], where it is not the default.
+        model: The contact model.
+        hand: The hand.
+        poses: Its pose (a batch of one).
+        found: Equilibrium in that pose.
+        limits: Digit → force limit that differs from the default [N].
     """
     span = model.spans[hand.name]
     u, reactions, contact = found.displacement[span], found.reactions[span], _contact(found, span)
@@ -62,6 +61,6 @@ def effort_at(
 
 
 def _contact(found: SolvedFrame | ContactInstant, span: slice) -> NDArray[np.float64]:
-    """Contact forces on some of the nodes, all pairs together [N], shape (n, 3)."""
+    """Contact forces on the nodes of a span, summed over pairs [N], shape (n, 3)."""
     nodal = found.nodal if isinstance(found, SolvedFrame) else [touch.nodal for touch in found.touches]
     return sum((one[span] for one in nodal), np.zeros((span.stop - span.start, 3)))

@@ -1,4 +1,4 @@
-"""The table of a simulation: a row for each frame and digit, and what the muscles say (R95, R118–R122)."""
+"""Contact table with one row per frame and digit, and suggestions from the muscle efforts (R95, R118–R122)."""
 
 from __future__ import annotations
 
@@ -14,44 +14,42 @@ from warpjld.fem.hand.suggestions import DigitSlopes, suggestions
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.bodies.skin_parts import digit_of_label
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["ContactRow", "ContactTable", "digit_rows", "write_table"]
+__all__ = ["ContactRow", "ContactTable", "csv_cell", "digit_rows", "write_table"]
 
 
 Slopes = Callable[[str, float, Mapping[str, float]], Mapping[str, DigitSlopes] | None]
-"""Actor, frame, and force of some digits there [N] → digit → its force, and how that follows its joints."""
+"""Actor, frame, and force by digit [N] → force and its derivatives by the digit's joints, by digit; None if unknown."""
 
 
 @dataclass(frozen=True)
 class ContactRow:
-    """What one digit feels and does at one frame.
+    """Contact and effort of one digit at one frame.
 
     Attributes:
-        frame: Number.
-        actor: Whose.
-        digit: ``index`` …, or ``palm``: everything else of the hand.
-        against: What it touches, joined by ``+``.
-        force_n: Length of the sum of its contact forces [N].
-        fx_n, fy_n, fz_n: That sum [N].
-        area_mm2: Area under pressure, inside a border that runs between nodes [mm²].
-        peak_kpa: Highest pressure: what presses on a node over the skin around it [kPa]; the highest of all is the top
-            of the pictures' scale.
-        bone_n: Length of the sum of the reactions that hold its bones, less those of the same hand in the same pose
-            when nothing touches it [N]. Where flesh is cut off, the cut bears with the bones that move it.
-        flesh_n: Length of the latter [N]: of the weight of its flesh, and of the strain in it since time 0 where joints
-            bend; NaN for the palm, and where the flesh alone finds no equilibrium: ``bone_n`` is then what contact
-            hands on to the bones by nearness.
-        limit_n: Largest force its muscles can bear [N]; NaN for the palm.
-        share: Largest share of the limits of ``bone_n`` and of the torques it makes about the digit's joints; NaN for
-            the palm.
-        sliding: Share of the area under pressure that slides; NaN where nothing touches.
+        frame: Frame number.
+        actor: Name of the actor.
+        digit: ``index`` …, or ``palm`` for everything else of the hand.
+        against: Names of what it touches, joined by ``+``.
+        force_n: Magnitude of the resultant of its contact forces [N].
+        fx_n, fy_n, fz_n: That resultant [N].
+        area_mm2: Contact area, with its border interpolated between nodes [mm²].
+        peak_kpa: Highest pressure: normal force on a node over its tributary area [kPa]; the highest of all is the top
+            of the pictures' colour scale.
+        bone_n: Magnitude of the resultant of the reactions at its bones, minus those of the same hand in the same pose
+            without contact [N]. Reactions at cut flesh count for the bones that move the cut.
+        flesh_n: Magnitude of the latter [N], due to the weight of its flesh and to its strain since time 0 where joints
+            bend; NaN for the palm, and if the flesh alone has no equilibrium (``bone_n`` is then from contact forces
+            assigned to the nearest bones).
+        limit_n: Force limit of its muscles [N]; NaN for the palm.
+        share: Largest ratio of ``bone_n`` and its torques about the digit's joints to their limits; NaN for the palm.
+        sliding: Share of the contact area that slides; NaN without contact.
         state: ``free``, ``sticking``, ``sliding``, or ``partly sliding``.
-        short_deg: How far the digit's joint that is farthest from what was asked of it stays short of it [degrees]; 0
-            where none does, and for the palm.
+        short_deg: Largest difference by which a joint of the digit stays behind the requested animation [degrees]; 0 if
+            none does, and for the palm.
     """
 
     frame: float
@@ -74,23 +72,23 @@ class ContactRow:
 
 
 class ContactTable:
-    """Rows as frames are solved.
+    """Contact table, filled as frames are solved.
 
     Args:
-        strength: Largest forces of digits [N], by actor and digit, where they are not the default.
-        asked: The animation as it was asked for; where it is given, rows say how far digits stay short of it.
+        strength: Force limits of digits that differ from the default [N], by actor and digit.
+        requested: The animation without edits; if given, rows contain how far digits stay behind it.
 
     Attributes:
-        rows: Those so far.
+        rows: Rows so far.
     """
 
-    def __init__(self, strength: Mapping[str, Mapping[str, float]], asked: Animation | None = None) -> None:
-        self._strength, self._asked = strength, asked
+    def __init__(self, strength: Mapping[str, Mapping[str, float]], requested: Animation | None = None) -> None:
+        self._strength, self._requested = strength, requested
         self.rows: list[ContactRow] = []
         self._efforts: dict[str, list[tuple[float, Effort]]] = {}
 
     def add(self, model: ContactModel, solved: SolvedFrame) -> str | None:
-        """Add the rows of a frame; a text where muscles can do no more (R118)."""
+        """Add the rows of a frame; returns a message if the muscles exceed their limits (R118)."""
         reason = None
         for hand in model.hands:
             poses = hand.bones.animation.pose(solved.frame)
@@ -104,11 +102,11 @@ class ContactTable:
         return None if reason is None else f"stopped at frame {solved.frame:g}: {reason}"
 
     def _short(self, hand: FleshBody, frame: float) -> dict[str, float]:
-        """How far digits stay short of what was asked [degrees]."""
-        if self._asked is None or not hand.bones.bendable:
+        """Largest lag of each digit's flexions behind the requested animation [degrees]."""
+        if self._requested is None or not hand.bones.bendable:
             return {}
-        asked = self._asked.actors[hand.name].angles(frame)[:, FLEXION]
-        missing = np.degrees(asked - hand.bones.animation.angles(frame)[:, FLEXION])
+        requested = self._requested.actors[hand.name].angles(frame)[:, FLEXION]
+        missing = np.degrees(requested - hand.bones.animation.angles(frame)[:, FLEXION])
         out: dict[str, float] = {}
         for joint, name in enumerate(hand.bones.skeleton.names):
             digit, knuckle = name.split(".")[-2:] if name.count(".") else ("", name)
@@ -117,7 +115,7 @@ class ContactTable:
         return out
 
     def notes(self) -> list[str]:
-        """Frames at which bones' forces are estimates."""
+        """Messages about frames at which the forces at bones are estimates."""
         out = []
         for name, efforts in self._efforts.items():
             unsure = [frame for frame, effort in efforts if np.isnan(effort.digits[0].flesh)]
@@ -129,11 +127,11 @@ class ContactTable:
         return out
 
     def suggestions(self, model: ContactModel, slopes: Slopes = lambda actor, frame, forces: None) -> list[str]:
-        """What to open, at the frame that strains an actor most, as the animation is after all.
+        """Suggestions which joints to open, at the frame of the largest load share of each actor.
 
         Args:
-            model: As it is after all edits.
-            slopes: How forces of an actor's digits follow their joints at a frame; None where that is not known.
+            model: The contact model with all edits.
+            slopes: Derivatives of the digits' forces by their joints; None if not known.
         """
         out = []
         for hand in model.hands:
@@ -158,8 +156,7 @@ class ContactTable:
 def digit_rows(model: ContactModel, hand: FleshBody, solved: SolvedFrame, effort: Effort) -> list[ContactRow]:
     """Rows of a hand at a frame: its digits and its palm."""
     digits = [*(d.digit.rpartition(".")[2] for d in effort.digits), "palm"]
-    labels = [digit_of_label(name) for name in hand.hand.label_names]
-    digit_of = np.array([*labels, ""])[hand.hand.node_labels]  # "" for nodes inside
+    digit_of = hand.node_digits
     pressure = solved.pressure(model)[model.spans[hand.name]]
     nodes = {digit: np.flatnonzero(digit_of == digit) for digit in digits}
     return [_row(model, hand, solved, effort, digit, nodes[digit], pressure) for digit in digits if len(nodes[digit])]
@@ -174,7 +171,7 @@ def _row(
     nodes: NDArray[np.integer],
     pressure: NDArray[np.float64],
 ) -> ContactRow:
-    """Of a digit's nodes (n,), as the hand numbers them, with the pressure at all of the hand's nodes (N,) [Pa]."""
+    """Row of a digit with nodes (n,), indexed within the hand, and pressures at all nodes of the hand (N,) [Pa]."""
     span = model.spans[hand.name]
     nodal_contact = solved.nodal_contact.of((slice(None), span))
     pushes = solved.nodal[:, span][:, nodes]
@@ -208,7 +205,7 @@ def _row(
 
 
 def write_table(path: Path, rows: Sequence[ContactRow]) -> None:
-    """Write rows as CSV or, by the suffix, Parquet."""
+    """Write rows as Parquet if the suffix is ``.parquet``, otherwise as CSV."""
     columns = {name: [getattr(row, name) for row in rows] for name in ContactRow.__dataclass_fields__}
     if path.suffix.lower() == ".parquet":
         import pyarrow
@@ -221,10 +218,11 @@ def write_table(path: Path, rows: Sequence[ContactRow]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(columns))
         writer.writeheader()
-        writer.writerows({k: _short(v) for k, v in asdict(row).items()} for row in rows)
+        writer.writerows({k: csv_cell(v) for k, v in asdict(row).items()} for row in rows)
 
 
-def _short(value: object) -> object:
+def csv_cell(value: object) -> object:
+    """A value as written to CSV: floats with six digits, NaN empty."""
     if not isinstance(value, float):
         return value
     return "" if np.isnan(value) else f"{value:.6g}"

@@ -1,4 +1,4 @@
-"""What the skin feels: force, pressure, area, slip and grip of every pad over time (R95, R125)."""
+"""Simulated tactile readings: force, pressure, area, slip and stick of every pad over time (R95, R125)."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ __all__ = ["Tactile", "tactile_of", "tactile_of_pairs", "tactile_readings"]
 
 @dataclass(frozen=True, eq=False)
 class Tactile:
-    """Readings of P pads at T times; a pad is the skin of one segment. NaN where there is nothing to read.
+    """Readings of P pads at T times; a pad is the skin of one segment. NaN where a quantity is undefined.
 
     Attributes:
         times: Shape (T,).
-        pads: ``left.index.distal``, ``left.palm.thumb``, …, P of them.
-        force: On the pad, friction included [N], shape (T, P, 3).
-        normal_force: Part of it that presses the skin in [N], shape (T, P).
+        pads: Names of the pads: ``left.index.distal``, ``left.palm.thumb``, ….
+        force: Contact force on the pad, friction included [N], shape (T, P, 3).
+        normal_force: Sum of the normal forces [N], shape (T, P).
         centre: Centre of pressure [m], shape (T, P, 3).
-        area: Area under pressure, inside a border that runs between nodes [m²], shape (T, P).
-        peak: Highest pressure: what presses on a node over the skin around it [Pa], shape (T, P).
-        slip: Way along the other side since the instant before, mean over that area [m], shape (T, P).
-        sticking: Share of that area that friction holds, shape (T, P).
+        area: Contact area, with its border interpolated between nodes [m²], shape (T, P).
+        peak: Highest pressure: normal force on a node over its tributary area [Pa], shape (T, P).
+        slip: Slip distance since the previous time, mean over the contact area [m], shape (T, P).
+        sticking: Share of the contact area that sticks, shape (T, P).
     """
 
     times: NDArray[np.float64]
@@ -48,17 +48,17 @@ class Tactile:
 
     @property
     def touching(self) -> NDArray[np.bool_]:
-        """Pads under pressure, shape (T, P)."""
+        """Mask of the pads in contact, shape (T, P)."""
         return np.asarray(self.normal_force > 0.0)
 
 
 def tactile_of(hand: FleshHand, instants: Sequence[ContactInstant], *, only: str | None = None) -> Tactile:
-    """Read the pads of a hand, on whichever side of a pair it is: sums over the nodes of each pad.
+    """Readings of a hand's pads, as slave or master of a pair: sums over the nodes of each pad.
 
     Args:
-        hand: The hand, first in the merged mesh.
-        instants: Equilibria in contact.
-        only: Name of the pair to read (``Touch.name``), where not all are wanted.
+        hand: The hand; its nodes are the first of the merged mesh.
+        instants: Equilibria.
+        only: Name of a single pair to read (``PairContact.name``); None: all pairs.
 
     Raises:
         InputError: No instant, or no pair of that name.
@@ -80,7 +80,7 @@ def tactile_of(hand: FleshHand, instants: Sequence[ContactInstant], *, only: str
 
 
 def tactile_readings(model: ContactModel, hand: FleshBody, frames: Sequence[SolvedFrame]) -> Tactile:
-    """Force, centre, area and slip of every pad of a hand of a simulation; times are frame numbers.
+    """Readings of the pads of a simulated hand; times are frame numbers.
 
     Raises:
         InputError: No frame.
@@ -95,7 +95,7 @@ def tactile_readings(model: ContactModel, hand: FleshBody, frames: Sequence[Solv
 
 
 _Reading = tuple[float, NDArray[np.float64], list[tuple[NDArray[np.float64], NodalContact]]]
-"""Time, displacement of the hand's nodes, and of each pair forces and what presses on them."""
+"""Time, displacements of the hand's nodes, and nodal forces and nodal contact of each pair."""
 
 
 def _read_all(hand: FleshHand, read: Sequence[_Reading]) -> Tactile:
@@ -104,14 +104,14 @@ def _read_all(hand: FleshHand, read: Sequence[_Reading]) -> Tactile:
     pads = tuple(name for name in hand.label_names if not name.endswith(WEB))
     place = np.array([pads.index(n) if n in pads else -1 for n in hand.label_names])
     pad_of = np.where(hand.node_labels >= 0, place[hand.node_labels], -1)
-    out = _nothing([time for time, _, _ in read], pads)
+    out = _without_contact([time for time, _, _ in read], pads)
     for frame, one in enumerate(read):
         _read(hand, pad_of, one, out, frame)
     return out
 
 
-def _nothing(times: Sequence[float], pads: tuple[str, ...]) -> Tactile:
-    """Readings where nothing touches."""
+def _without_contact(times: Sequence[float], pads: tuple[str, ...]) -> Tactile:
+    """Readings without contact, to be filled in."""
     shape = (len(times), len(pads))
     return Tactile(
         np.array(times, dtype=np.float64),
@@ -127,6 +127,7 @@ def _nothing(times: Sequence[float], pads: tuple[str, ...]) -> Tactile:
 
 
 def _read(hand: FleshHand, pad_of: NDArray[np.int64], read: _Reading, out: Tactile, frame: int) -> None:
+    """Fill in row ``frame`` of ``out``; ``pad_of``: index of each node's pad, -1 for none, shape (N,)."""
     count, pads = len(hand.mesh.nodes), len(out.pads)
     x = hand.mesh.nodes + read[1]
     skin = np.flatnonzero(pad_of >= 0)
@@ -140,28 +141,28 @@ def _read(hand: FleshHand, pad_of: NDArray[np.int64], read: _Reading, out: Tacti
     around = tributary_areas(hand.mesh, hand.skin_faces, x)[skin]
     weighted = np.stack([np.bincount(pad, summed["force"][skin] * x[skin, k], pads) for k in range(3)], axis=1)
     np.maximum.at(out.peak[frame], pad, summed["force"][skin] / np.maximum(around, 1e-300))
-    some, known = force > 0.0, area > 0.0
+    loaded, touching = force > 0.0, area > 0.0
     out.normal_force[frame], out.area[frame] = force, area
-    out.centre[frame, some] = weighted[some] / force[some, None]
-    out.slip[frame, known] = slid[known] / area[known]
-    out.sticking[frame, known] = held[known] / area[known]
+    out.centre[frame, loaded] = weighted[loaded] / force[loaded, None]
+    out.slip[frame, touching] = slid[touching] / area[touching]
+    out.sticking[frame, touching] = held[touching] / area[touching]
 
 
 def tactile_of_pairs(instants: Sequence[ContactInstant]) -> Tactile:
-    """Read every pair's slave as one pad, by the pair's name: pads that belong to no hand.
+    """Readings with the slave surface of every pair as one pad, named after the pair; for bodies without a hand.
 
     Args:
-        instants: Equilibria in contact, all of the same pairs.
+        instants: Equilibria with the same contact pairs.
 
     Raises:
-        InputError: No instant, or pairs that change.
+        InputError: No instant, or different pairs.
     """
     if not instants:
         raise InputError("tactile: want at least one instant")
     pads = tuple(touch.name for touch in instants[0].touches)
     if any(tuple(touch.name for touch in instant.touches) != pads for instant in instants):
         raise InputError("tactile: want the same pairs at every instant")
-    out = _nothing([instant.time for instant in instants], pads)
+    out = _without_contact([instant.time for instant in instants], pads)
     for frame, instant in enumerate(instants):
         for pad, touch in enumerate(instant.touches):
             area, total = touch.contact_area, touch.area @ np.maximum(touch.pressure, 0.0)

@@ -30,10 +30,11 @@ TACTILE_COLUMNS = (
 """One row for each time and pad."""
 
 _SHADES = ("#1b4965", "#ca6702", "#8fb339", "#9b2226", "#6a4c93", "#555555")
+"""Line colours of the pads of a digit."""
 
 
 def tactile_rows(tactile: Tactile) -> list[dict[str, Any]]:
-    """Rows of the table, pads within times."""
+    """Rows of the table, ordered by time and pad."""
     out = []
     for t, time in enumerate(tactile.times):
         for p, pad in enumerate(tactile.pads):
@@ -67,13 +68,13 @@ def write_tactile(path: Path, tactile: Tactile) -> None:
 
 
 def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "time") -> None:
-    """Plot normal force, area, and slip and sticking of every pad that is ever touched, digits in columns.
+    """Plot normal force, area, slip and sticking share of every pad that is ever touched, one column per digit.
 
     Args:
-        path: PNG.
+        path: PNG file.
         tactile: Readings.
-        title: Above all.
-        axis: What times are.
+        title: Title of the figure.
+        axis: Label of the time axis.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -115,6 +116,6 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "tim
 
 
 def _group(pad: str) -> str:
-    """Digit of a pad, or the palm; of a pad that belongs to no hand, what its name begins with."""
+    """Digit of a pad, or ``palm``; for pads of no hand, the last part but one of the name, else ``palm``."""
     parts = pad.split(".")
     return "palm" if "palm" in parts or len(parts) < 2 or parts[-1] in ("wrist", "forearm") else parts[-2]

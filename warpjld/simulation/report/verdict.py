@@ -1,4 +1,4 @@
-"""Whether a grasp is realistic, in words and numbers (B §3.3, R112, R118, R119)."""
+"""Verdict on a contact simulation: status, and whether the grasp is realistic (B §3.3, R112, R118, R119)."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ if TYPE_CHECKING:
 __all__ = ["CRUSHED", "RELEASED", "ContactVerdict", "verdict_of"]
 
 CRUSHED = "CRUSHED"
-"""Status of what is pressed beyond what flesh bears."""
+"""Status of a simulation in which flesh is pressed beyond what it bears."""
 RELEASED = "RELEASED"
-"""Status of what nothing holds any more, and falls."""
+"""Status of a simulation in which an object is no longer held, and falls."""
 _PUSHED = 1e-5
-"""Way of a free object that something has pushed [m]: without weight it stays where it is."""
+"""Displacement from which a free object counts as pushed [m]; without weight it stays in place otherwise."""
 _BEARS = 0.05
-"""Share of what presses on an object from which on a digit counts."""
+"""Share of the contact forces on an object from which a digit counts as holding it."""
 
 
 @dataclass(frozen=True)
 class ContactVerdict:
-    """How a contact solve ended.
+    """Verdict on a contact simulation.
 
     Attributes:
-        status: Name of the solver's status; ``OVERLAP`` where it did not keep apart what it was to, ``CRUSHED`` where
-            flesh is pressed beyond what any bears, ``RELEASED`` where nothing holds an object any more, and it falls.
-        text: One line.
-        lines: One for each digit that touched.
-        suggestions: What to change.
-        frames: First and last frame that were solved.
-        grips: What came of searches for a grip.
-        corrections: What was opened, and what could not be.
-        balance: Net force and moment on every object that is touched at the last frame.
-        stops: Digits that closed no farther than they could, and how far they stay short of what was asked.
+        status: Name of the solver's status; ``OVERLAP`` if bodies in contact still overlap, ``CRUSHED`` if flesh is
+            pressed beyond what it bears, ``RELEASED`` if an object is no longer held and falls.
+        text: Summary in one line.
+        lines: One line for each digit in contact.
+        suggestions: Suggested changes of the animation.
+        frames: First and last solved frame; None without any.
+        grips: Results of grip searches.
+        corrections: Results of corrections.
+        balance: Resultant force and moment on every object in contact at the last frame.
+        stops: Digits that stopped at a limit, and how far they stay behind the animation.
     """
 
     status: str
@@ -58,11 +58,11 @@ class ContactVerdict:
 
     @property
     def failed(self) -> bool:
-        """Whether frames that were asked for are missing, or are wrong."""
+        """Whether requested frames are missing or wrong."""
         return self.status not in (SolveStatus.CONVERGED.name, SolveStatus.STOPPED.name, CRUSHED, RELEASED)
 
     def content(self) -> dict[str, Any]:
-        """As plain values."""
+        """The verdict as plain values for JSON."""
         return {
             "status": self.status,
             "verdict": self.text,
@@ -82,13 +82,13 @@ def verdict_of(
     suggestions: Sequence[str],
     overlaps: Sequence[RemainingOverlap] = (),
 ) -> ContactVerdict:
-    """Judge what was solved.
+    """Verdict on solved frames.
 
     Args:
-        solved: The frames.
-        rows: The table.
-        suggestions: What the muscles' report suggests at the frame that strains them most.
-        overlaps: What contact was to keep apart and did not, deepest first.
+        solved: Result of the solve.
+        rows: Rows of the contact table.
+        suggestions: Suggestions from the muscle efforts at the frame of the largest load share.
+        overlaps: Overlaps that contact should have removed, deepest first.
     """
     frames = (solved.frames[0].frame, solved.frames[-1].frame) if solved.frames else None
     lines = []
@@ -152,7 +152,7 @@ def verdict_of(
 
 
 def _lost(solved: SolveResult) -> str:
-    """Free objects that slipped out of the hands that held or pushed them, in words."""
+    """Message about free objects that slipped out of the hands; empty if there is none."""
     held: dict[str, float] = {}
     for frame in solved.frames:
         held |= {one.object: frame.frame for one in balances(solved.model, frame)}
@@ -167,7 +167,7 @@ def _lost(solved: SolveResult) -> str:
 
 
 def _slides(rows: Sequence[ContactRow], last: Sequence[ObjectBalance]) -> str:
-    """A digit that bears much of a grasp and slides on it in whole at the last frame, in words."""
+    """Message about a digit that helps to hold an object and slides on it entirely at the last frame; empty if none."""
     grasped = {one.object: one for one in last if one.grasped}
     for row in rows:
         for name in row.against.split("+"):
@@ -180,7 +180,7 @@ def _slides(rows: Sequence[ContactRow], last: Sequence[ObjectBalance]) -> str:
 
 
 def _stops(solved: SolveResult, rows: Sequence[ContactRow]) -> tuple[str, ...]:
-    """What was asked of digits and not reached."""
+    """Messages about digits that stopped short of the requested flexions."""
     out = []
     for stop in solved.stops:
         digit = stop.digit.rpartition(".")[2]

@@ -1,4 +1,4 @@
-"""Overlap of visible surfaces that contact did not solve: what stays, and skin without flesh that was pushed aside."""
+"""Remaining overlap of visible surfaces after contact, and displacement of skin without simulated flesh."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from warpjld.simulation.display.surfaces import DeformedSurfaces
 __all__ = ["RemainingOverlap", "remaining_overlaps", "visible_overlap_notes"]
 
 _SEEN = 2e-4
-"""Overlap that is worth a note [m]."""
+"""Overlap from which a note is given [m]."""
 
 
 @dataclass(frozen=True)
 class RemainingOverlap:
-    """Two that overlap, at frames that were solved, by more than contact leaves.
+    """Two surfaces that overlap at solved frames although contact should separate them.
 
     Attributes:
-        one, other: Objects, or parts of a hand with its name.
-        depth: At most, beyond what pictures move apart [m].
-        first, last: Frames.
+        one, other: Objects or parts of a hand.
+        depth: Largest depth after the display correction [m].
+        first, last: First and last frame at which they overlap.
     """
 
     one: SurfacePart
@@ -41,10 +41,10 @@ class RemainingOverlap:
 
 
 def remaining_overlaps(surfaces: DeformedSurfaces) -> list[RemainingOverlap]:
-    """What contact was to keep apart and did not, deepest first: forces there are wrong."""
+    """Overlaps that contact should have removed, deepest first; forces there are wrong."""
     found: dict[tuple[SurfacePart, SurfacePart], RemainingOverlap] = {}
     for frame in (solved.frame for solved in surfaces.frames):
-        for one, other, overlap in _known(surfaces, frame):
+        for one, other, overlap in _solved_overlaps(surfaces, frame):
             if overlap.depth > surfaces.most(one.surface):
                 two = (other, one) if (other, one) in found else (one, other)
                 was = found.get(two, RemainingOverlap(*two, 0.0, frame, frame))
@@ -53,7 +53,7 @@ def remaining_overlaps(surfaces: DeformedSurfaces) -> list[RemainingOverlap]:
 
 
 def visible_overlap_notes(surfaces: DeformedSurfaces, frame: float) -> list[str]:
-    """Notes on a frame: overlap that its pictures show, and what pushes skin aside that has no flesh to give way."""
+    """Notes on a frame: overlap that remains visible, and skin without simulated flesh that was displaced."""
     carried, separated = surfaces.carried(frame), surfaces.separated(frame)
     out = []
     for (one, other), depth in separated.left.items():
@@ -75,8 +75,8 @@ def visible_overlap_notes(surfaces: DeformedSurfaces, frame: float) -> list[str]
     return out
 
 
-def _known(surfaces: DeformedSurfaces, frame: float) -> Iterator[tuple[SurfacePart, SurfacePart, Overlap]]:
-    """Overlap that is contact's concern, of parts of hands by their names."""
+def _solved_overlaps(surfaces: DeformedSurfaces, frame: float) -> Iterator[tuple[SurfacePart, SurfacePart, Overlap]]:
+    """Overlaps of surfaces that contact solves, with hands divided into parts."""
     hands = {hand.name: hand for hand in surfaces.model.hands}
     for (one, other), overlap in surfaces.separated(frame).inside.items():
         hand = hands.get(one.surface)
@@ -92,7 +92,7 @@ def _known(surfaces: DeformedSurfaces, frame: float) -> Iterator[tuple[SurfacePa
 
 
 def _why(surfaces: DeformedSurfaces, one: SurfacePart, other: SurfacePart) -> str:
-    """What leaves two overlapping, and what to do."""
+    """Advice for removing the overlap of two surfaces."""
     for hand in surfaces.model.hands:
         if one.surface == hand.name and one.part and other.part:
             bare = [part for part in (one.part, other.part) if not hand.has_flesh(part)]

@@ -1,4 +1,4 @@
-"""The deformed volumes as a VTK series: displacement, reaction and stress (R95)."""
+"""Export of the deformed volumes as a VTK series: displacement, reaction and stress (R95)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["write_volumes"]
 
 
 def write_volumes(path: Path, model: ContactModel, frames: Sequence[SolvedFrame]) -> None:
-    """Write ``path`` (.pvd) and a ``.vtu`` for each frame that was solved."""
+    """Write ``path`` (.pvd) and one ``.vtu`` file per solved frame."""
     series = Series(path)
     for frame in frames:
         instant = Instant(1.0, frame.displacement, np.asarray(frame.reactions), frame.solves, 0, 0.0)

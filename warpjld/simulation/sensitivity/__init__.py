@@ -1,1 +1,1 @@
-"""How contact forces, digits' forces and pressures follow joint angles, places, moduli and friction."""
+"""Sensitivities of contact forces, digit loads and pressures to joint angles, placements, moduli and friction."""

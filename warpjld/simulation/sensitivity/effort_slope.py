@@ -1,4 +1,4 @@
-"""How what muscles have to do follows a parameter."""
+"""Derivatives of muscle efforts with respect to a parameter."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from warpjld.skeleton import Poses
 __all__ = ["DigitSlope", "EffortTangent"]
 
 _FAR = 1e-6
-"""Way of the node that moves most in the differences of what is made of forces and places [m]."""
+"""Largest nodal displacement in the finite difference of efforts as a function of forces and positions [m]."""
 _PART = 1e-4
-"""Share by which reactions change in them, where nothing moves."""
+"""Largest relative change of the reactions in that finite difference."""
 
 
 @dataclass(frozen=True, eq=False)
 class DigitSlope:
-    """Derivatives of what one digit's muscles have to do, per unit of a parameter.
+    """Derivatives of one digit's effort, per unit of a parameter.
 
     Attributes:
-        force: Of its force, as ``DigitEffort.force`` [N].
-        load: Of the sum of the forces on its phalanges [N], shape (3,).
-        torques: Of base, knuckle 2 and knuckle 3 [N m], shape (3,).
-        shares: Of force and torques over their limits, as ``DigitEffort.shares``, shape (4,).
+        force: Derivative of ``DigitEffort.force`` [N].
+        load: Derivative of the resultant force on its phalanges [N], shape (3,).
+        torques: Derivatives of the torques at base, knuckle 2 and knuckle 3 [N m], shape (3,).
+        shares: Derivatives of force and torques over their limits, as ``DigitEffort.shares``, shape (4,).
     """
 
     force: float
@@ -46,15 +46,15 @@ class DigitSlope:
 
 
 class EffortTangent:
-    """Efforts of a hand at an equilibrium, and how they follow parameters.
+    """Efforts of a hand at an equilibrium, and their derivatives with respect to parameters.
 
     Args:
-        model: Everything.
-        hand: Whose.
+        model: The contact model.
+        hand: The hand.
         instant: The equilibrium.
-        contact: Contact forces on all nodes there [N], shape (N, 3).
-        poses: Its pose there.
-        limits: Digit → largest force [N], where it is not the default.
+        contact: Contact forces on all nodes [N], shape (N, 3).
+        poses: Pose of the hand.
+        limits: Digit → force limit that differs from the default [N].
     """
 
     def __init__(
@@ -81,12 +81,12 @@ class EffortTangent:
         change: Perturbation,
         pose: Callable[[float], Poses] | None = None,
     ) -> dict[str, DigitSlope]:
-        """Of every digit.
+        """Derivatives of the efforts of every digit, by central differences along the linear response.
 
         Args:
-            response: How the equilibrium follows.
-            change: What the parameter changes.
-            pose: The pose at a change of the parameter; None where it stays.
+            response: Derivative of the equilibrium.
+            change: Perturbation by the parameter.
+            pose: Pose as a function of the change of the parameter; None if it is constant.
         """
         span = self._span
         du, held = response.displacement[span], response.reactions[span]
@@ -130,7 +130,7 @@ class EffortTangent:
         return loads_from_reactions(self._hand.hand, u, held)
 
     def _own(self, change: Perturbation) -> Perturbation:
-        """What concerns the hand alone."""
+        """The part of a perturbation that concerns the hand's own mesh."""
         span, mesh = self._span, self._model.body.mesh
         known = None if change.prescribed is None else change.prescribed[3 * span.start : 3 * span.stop]
         first = mesh.elements[:, 0]
@@ -146,7 +146,7 @@ def _slope(
 
 
 def _untouched(hand: FleshBody, alone: Untouched, loads: Loads) -> EquilibriumTangent:
-    """Linear system of the flesh that nothing touches."""
+    """Tangent of the flesh without contact."""
     instant = ContactInstant(0.0, alone.displacement, alone.reactions, (), 0, 0, 0.0)
     last = LastStep(0.0, alone.displacement, (), ())
     found = ContactSolution(SolveStatus.CONVERGED, (instant,), "", (), (), loads, None, last)

@@ -1,4 +1,4 @@
-"""The gradient of a solved frame: everything that follows the parameters, as arrays (P parameters, N nodes)."""
+"""Gradient of a solved frame with respect to P parameters, as arrays over parameters and nodes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.contact import ContactSolution
-from warpjld.fem.contact.results.nodal_contact import tributary_areas
 from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, Response
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
@@ -22,19 +21,19 @@ from warpjld.skeleton import Poses
 __all__ = ["Gradient", "gradient_at"]
 
 _FAR = 1e-7
-"""Way of the node that moves most in differences of areas [m]."""
+"""Largest nodal displacement in the finite difference of tributary areas [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Derivatives of an equilibrium by P parameters, each per unit of it (rad, m, or 1).
+    """Derivatives of an equilibrium with respect to P parameters, per unit of each (rad, m, or 1).
 
     Attributes:
-        parameters: Those.
-        displacement: Of all nodes [m], shape (P, N, 3).
-        reactions: Of the forces that hold prescribed nodes [N], shape (P, N, 3).
-        contact_force: Of the contact forces on all nodes, friction included [N], shape (P, N, 3).
-        pressure: Of the contact pressure at all nodes [Pa], shape (P, N).
+        parameters: The parameters.
+        displacement: Derivatives of the displacements of all nodes [m], shape (P, N, 3).
+        reactions: Derivatives of the reactions at prescribed nodes [N], shape (P, N, 3).
+        contact_force: Derivatives of the contact forces on all nodes, friction included [N], shape (P, N, 3).
+        pressure: Derivatives of the contact pressure at all nodes [Pa], shape (P, N).
     """
 
     parameters: tuple[Parameter, ...]
@@ -46,29 +45,29 @@ class Gradient:
     _digits: Mapping[str, Sequence[Mapping[str, DigitSlope]]]
 
     def force(self, name: str) -> NDArray[np.float64]:
-        """Of the sum of the contact forces on a body [N], shape (P, 3).
+        """Derivative of the sum of the contact forces on a body [N], shape (P, 3).
 
         Raises:
-            InputError: No such body.
+            InputError: No deformable body of that name.
         """
         if name not in self._spans:
             raise InputError(f"name: nothing called {name} deforms here; there are {', '.join(self._spans)}")
         return np.asarray(self.contact_force[:, self._spans[name]].sum(axis=1))
 
     def digits(self, actor: str) -> dict[str, NDArray[np.float64]]:
-        """Of the force of each digit's bones, ``bone_n`` in the table [N]: digit → shape (P,).
+        """Derivatives of ``bone_n`` of the table [N]: digit → shape (P,).
 
         Raises:
-            InputError: No such actor.
+            InputError: No actor with flesh of that name.
         """
         rows = self._rows(actor)
         return {digit: np.array([row[digit].force for row in rows]) for digit in rows[0]}
 
     def torques(self, actor: str) -> dict[str, NDArray[np.float64]]:
-        """Of the torques of base, knuckle 2 and knuckle 3 [N m]: digit → shape (P, 3).
+        """Derivatives of the torques at base, knuckle 2 and knuckle 3 [N m]: digit → shape (P, 3).
 
         Raises:
-            InputError: No such actor.
+            InputError: No actor with flesh of that name.
         """
         rows = self._rows(actor)
         return {digit: np.array([row[digit].torques for row in rows]) for digit in rows[0]}
@@ -89,14 +88,15 @@ def gradient_at(
     """Derivatives of the last equilibrium of a solution.
 
     Args:
-        model: Everything, as it was solved.
-        history: What was known before.
-        solution: Of the frame.
-        parameters: At least one.
-        limits: Largest forces of digits [N], by actor and digit, where they are not the default.
+        model: The contact model of the frame.
+        history: History before the frame.
+        solution: Solution of the frame.
+        parameters: At least one parameter.
+        limits: Force limits of digits that differ from the default [N], by actor and digit.
 
     Raises:
-        InputError: Parameters of nothing that is there, or a solution that was read from a state.
+        InputError: A parameter of a joint, object or pair that is not in the model, or a solution read from a state
+            file.
         SensitivityError: The equilibrium has no derivative.
     """
     if not parameters:
@@ -125,7 +125,7 @@ def gradient_at(
 
 
 def _posing(hand: FleshBody, parameter: Parameter, time: float) -> Callable[[float], Poses] | None:
-    """A hand's pose at a change of a parameter; None where it stays."""
+    """Pose of a hand as a function of the change of a parameter; None if the pose does not depend on it."""
     if not (isinstance(parameter, JointAngle) and parameter.actor == hand.name):
         return None
     angles, along = hand.bones.angles(time), direction_of(hand, parameter)
@@ -135,15 +135,11 @@ def _posing(hand: FleshBody, parameter: Parameter, time: float) -> Callable[[flo
 def _pressure(
     model: ContactModel, tangent: EquilibriumTangent, solution: ContactSolution, response: Response
 ) -> NDArray[np.float64]:
-    """Of what presses on a node over the area around it [Pa], shape (N,)."""
-    mesh, u, du = model.body.mesh, solution.last.displacement, response.displacement
+    """Derivative of the nodal pressure (normal force over tributary area) [Pa], shape (N,)."""
+    x, du = model.body.mesh.nodes + solution.last.displacement, response.displacement
     step = _FAR / max(float(np.abs(du).max(initial=0.0)), _FAR)
-
-    def areas(by: float) -> NDArray[np.float64]:
-        x = mesh.nodes + u + by * du
-        return sum((tributary_areas(mesh, one.faces, x) for one in model.bodies), np.zeros(len(x)))
-
-    area, wider = areas(0.0), (areas(step) - areas(-step)) / (2.0 * step)
+    area = model.tributary_areas(x)
+    wider = (model.tributary_areas(x + step * du) - model.tributary_areas(x - step * du)) / (2.0 * step)
     pushed = tangent.pushed.sum(axis=0)
     pushes = tangent.pushes(response).sum(axis=0)
     rate = pushes * area - pushed * wider

@@ -1,4 +1,4 @@
-"""How the force of each digit follows its own joints."""
+"""Derivatives of each digit's force with respect to its own joints."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from warpjld.simulation.sensitivity.parameters import JointAngle
 __all__ = ["joint_slopes"]
 
 _JOINTS = ("base", "knuckle2", "knuckle3")
+"""Joints of a digit, proximal to distal."""
 
 
 def joint_slopes(
     model: ContactModel, history: History, solution: ContactSolution, actor: str, forces: Mapping[str, float]
 ) -> dict[str, DigitSlopes] | None:
-    """Of the digits of an actor at the last equilibrium of a solution; None where it has no derivative.
+    """Derivatives by digit at the last equilibrium of a solution; None if it has no derivative.
 
     Args:
-        model: Everything, as it was solved.
-        history: What was known before.
-        solution: Of the frame.
-        actor: Whose; its joints have angles.
-        forces: Force there of the digits that are asked about [N].
+        model: The contact model of the frame.
+        history: History before the frame.
+        solution: Solution of the frame.
+        actor: Name of the actor; it has to be driven by joint angles.
+        forces: Forces at the equilibrium of the digits to evaluate [N].
     """
     parameters = [JointAngle(actor, f"{digit}.{joint}") for digit in forces for joint in _JOINTS]
     try:

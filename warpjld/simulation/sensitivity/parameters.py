@@ -1,4 +1,4 @@
-"""What a simulation is differentiated by, and what each changes in its equations."""
+"""Parameters by which a simulation is differentiated, and the perturbations they cause in its equations."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from warpjld.skeleton.tree import CHANNELS
 __all__ = ["Friction", "JointAngle", "Modulus", "ObjectPlace", "Parameter", "angles_perturbed", "perturbation_of"]
 
 _TURN = 1e-5
-"""Half of the difference of angles that bones' motions are differentiated with [rad]."""
+"""Step of the central difference of bone motions by angles [rad]."""
 
 
 @dataclass(frozen=True)
 class JointAngle:
-    """An angle of a joint at the frame, the frames before as they are [rad].
+    """A joint angle at the frame, with earlier frames held constant [rad].
 
     Attributes:
-        actor: Whose.
-        joint: As ``index.base``, or ``left.index.base``.
+        actor: Name of the actor.
+        joint: Name of the joint, as ``index.base``, or ``left.index.base``.
         channel: One of ``CHANNELS``.
     """
 
@@ -39,10 +39,10 @@ class JointAngle:
 
 @dataclass(frozen=True)
 class ObjectPlace:
-    """Place of an object at the frame, or of what is prescribed of it, the frames before as they are [m].
+    """Position of an object, or of its prescribed points, at the frame, with earlier frames held constant [m].
 
     Attributes:
-        object: Name.
+        object: Name of the object.
         axis: 0, 1 or 2.
     """
 
@@ -52,11 +52,11 @@ class ObjectPlace:
 
 @dataclass(frozen=True)
 class Modulus:
-    """All moduli of a body, or of one of its regions, as a share of what they are [1]: Poisson's ratio stays.
+    """Common factor on the moduli of a body or one of its regions [1]; Poisson's ratio is constant.
 
     Attributes:
-        body: Actor or object.
-        region: As the mesh names it; all regions where left out.
+        body: Name of the actor or object.
+        region: Region of the mesh; None: all regions.
     """
 
     body: str
@@ -65,10 +65,10 @@ class Modulus:
 
 @dataclass(frozen=True)
 class Friction:
-    """Coulomb's μ between two bodies [1]; it counts where they slide.
+    """Coulomb's μ between two bodies [1]; it has an influence where they slide.
 
     Attributes:
-        one, other: Actors or objects, in any order.
+        one, other: Names of actors or objects, in any order.
     """
 
     one: str
@@ -79,10 +79,10 @@ Parameter = JointAngle | ObjectPlace | Modulus | Friction
 
 
 def perturbation_of(model: ContactModel, history: History, time: float, parameter: Parameter) -> Perturbation:
-    """What a parameter changes at a time.
+    """Perturbation of the equations per unit of a parameter, at a time.
 
     Raises:
-        InputError: A parameter of nothing that is there, or of what is free.
+        InputError: A parameter of a joint, object or pair that is not in the model, or of a free object.
     """
     if isinstance(parameter, JointAngle):
         hand = _hand(model, parameter.actor)
@@ -99,10 +99,10 @@ def perturbation_of(model: ContactModel, history: History, time: float, paramete
 
 
 def direction_of(hand: FleshBody, parameter: JointAngle) -> NDArray[np.float64]:
-    """The one angle, shape (J, 4).
+    """Unit direction of one joint angle, shape (J, 4).
 
     Raises:
-        InputError: No such joint or channel, or bones that were not given by angles.
+        InputError: No such joint or channel, or a hand that is not driven by angles.
     """
     if not hand.bones.bendable:
         raise InputError(f"parameters: {parameter.actor} has poses, not angles")
@@ -120,7 +120,7 @@ def angles_perturbed(
     time: float,
     direction: NDArray[np.float64],
 ) -> Perturbation:
-    """A hand's angles (J, 4) [rad] that change along a direction (J, 4)."""
+    """Perturbation of a hand's bones at angles (J, 4) [rad] that change along a direction (J, 4)."""
     ends = [hand.bones.moves_of(angles + sign * _TURN * direction, time) for sign in (1.0, -1.0)]
     ahead, behind = (_held_at(hand, there, time) for there in ends)
     out = np.zeros(model.body.degrees)
@@ -129,7 +129,7 @@ def angles_perturbed(
 
 
 def _held_at(hand: FleshBody, moves: Moves, time: float) -> Prescribed:
-    """What a hand's bones prescribe where they are elsewhere."""
+    """Dirichlet conditions of a hand whose bones have given motions."""
     return replace(hand, moves=lambda now: moves).prescribed(time)
 
 
@@ -161,7 +161,7 @@ def _placed(model: ContactModel, history: History, time: float, parameter: Objec
 
 
 def _stiffer(model: ContactModel, parameter: Modulus) -> NDArray[np.float64]:
-    """Share by which each element's moduli grow, shape (E,)."""
+    """Relative change of each element's moduli per unit of the parameter, shape (E,)."""
     if parameter.body not in model.spans:
         raise InputError(
             f"parameters: nothing called {parameter.body} deforms here; there are {', '.join(model.spans)}"

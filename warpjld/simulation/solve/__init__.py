@@ -1,1 +1,1 @@
-"""Frames solved one after another: the start, sub-steps, branches, checks before and after, checkpoints."""
+"""Solving the frames of a contact simulation: start frame, sub-steps, branches, force limits, checks, checkpoints."""

@@ -1,8 +1,9 @@
-"""How near prescribed bones come to what cannot give way, seen before anything is solved (R112).
+"""Clearance between prescribed bones and rigid obstacles, known before an equilibrium is solved (R112).
 
-Flesh between a bone and a rigid wall stiffens without bound: what is left of it at the nearest node of a bone, over
-what that node has at rest, tells what pressure is to be expected, about .3 MPa at a half, 1–2 MPa at .38, tens at an
-eighth (three grasps of two hands: a rule of thumb). At nothing no force can help: the bone is in the object.
+Flesh between a bone and a rigid wall stiffens without bound. The remaining thickness of flesh at the nearest node of a
+bone, relative to that at rest, indicates the pressure to be expected: about 0.3 MPa at 0.5, 1–2 MPa at 0.38, tens of
+MPa at 0.125 (three grasps of two hands: a rule of thumb). At 0 or less there is no solution: the bone is inside the
+object.
 """
 
 from __future__ import annotations
@@ -21,21 +22,22 @@ from warpjld.simulation.bodies.skin_parts import digit_of_label
 __all__ = ["TIGHT", "BoneClearance", "TightBone"]
 
 TIGHT = 0.4
-"""Share of a bone's flesh that is left, below which pressures of a megapascal are to be expected."""
+"""Relative thickness of the flesh over a bone below which pressures of about 1 MPa are to be expected."""
 _LEAST = 5e-4
-"""Bones whose flesh is thinner than this at rest say nothing: they lie at a cut [m]."""
+"""Bone nodes with thinner flesh than this at rest are ignored, since they lie at a cut [m]."""
 
 
 @dataclass(frozen=True)
 class TightBone:
-    """The bone of a digit, or of the palm, that comes nearest to an object.
+    """Smallest clearance between a bone of a digit or the palm and an object.
 
     Attributes:
-        actor: Whose.
+        actor: Name of the actor.
         digit: ``index``, …, or ``palm``.
-        object: What it comes near to.
-        left: Distance over the flesh at rest: 1 and more where the flesh is not pressed, below 0 inside the object.
-        distance: [m], negative inside.
+        object: Name of the object.
+        left: Distance relative to the thickness of the flesh at rest: 1 or more without compression, below 0 inside the
+            object.
+        distance: Signed distance [m], negative inside.
     """
 
     actor: str
@@ -54,10 +56,10 @@ class TightBone:
 
 
 class BoneClearance:
-    """Bones of a model's hands, and the flesh over them at rest.
+    """Clearance of the bones of a model's hands, relative to the flesh over them at rest.
 
     Args:
-        model: Everything, however it is driven.
+        model: The contact model; its motion does not matter.
     """
 
     def __init__(self, model: ContactModel) -> None:
@@ -65,17 +67,16 @@ class BoneClearance:
 
     @cached_property
     def _bones(self) -> dict[str, tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], list[str]]]:
-        """By hand: nodes, number of their digit, flesh over them [m], names of the digits."""
+        """By hand: bone nodes, index of their digit, thickness of the flesh over them [m], names of the digits."""
         return {hand.name: _bones_of(hand) for hand in self._model.hands}
 
     def inside(self, model: ContactModel, time: float) -> str | None:
-        """A bone that lies in an object at a time, in words with the frame: no force can part them."""
-        worst = min(self.nearest(model, time), key=lambda one: one.left, default=None)
+        """Message about a bone inside an object at a time, with the frame; None if there is none."""
+        worst = min(self.nearest(model, time), key=lambda bone: bone.left, default=None)
         return None if worst is None or worst.left > 0.0 else f"at frame {model.start + time:.4g}: {worst.text}"
 
     def nearest(self, model: ContactModel, time: float) -> list[TightBone]:
-        """Of every digit and obstacle the bone that has least flesh left at a time; those with all of it are left
-        out."""
+        """Bone with the least relative thickness of flesh at a time, by digit and obstacle, where it is below 1."""
         out = []
         for hand in model.hands:
             nodes, digit, depth, names = self._bones[hand.name]
@@ -103,5 +104,5 @@ def _bones_of(
     count = [len(one) for one in hand.hand.bone_nodes]
     digit = np.repeat([names.index(digit_of_label(name)) for name in hand.hand.segments], count)
     depth = -Facets(hand.mesh.nodes, triangles).project(hand.mesh.nodes[nodes]).distance
-    some = np.flatnonzero(depth > _LEAST)
-    return nodes[some], digit[some].astype(np.int64), depth[some], names
+    covered = np.flatnonzero(depth > _LEAST)
+    return nodes[covered], digit[covered].astype(np.int64), depth[covered], names

@@ -1,7 +1,7 @@
-"""Contact solved through time: the way of the animation, and branches aside from it.
+"""Contact solved along the animation (``solve_onward``), and along trial branches off it (``solve_branch``).
 
-A branch begins at an equilibrium that was found and leaves it as it is: what would come of other angles, or without a
-support. Unless it is given a duration it takes no time: whatever else moves stands still.
+A branch starts from a known equilibrium, which it leaves unchanged, and answers what-if questions: other joint angles,
+or no support. Unless it has a duration, the animation stands still meanwhile.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from warpjld.simulation.bodies.model import ContactModel
 __all__ = ["solve_branch", "solve_onward"]
 
 _TOLERANCE = 1e-4
-"""Residual over the forces that balance: what a film and a table of newtons need."""
+"""Convergence tolerance, residual over the forces in balance; chosen as enough for films and tables of forces."""
 
 _MOMENT = 1e-6
-"""Length of a step that takes no time [frames]."""
+"""Nominal length of a load step on a branch without duration [frames]."""
 
 
 def solve_onward(
@@ -38,16 +38,20 @@ def solve_onward(
     aitken: bool = False,
     halvings: int | None = None,
 ) -> ContactSolution:
-    """Equilibria at rising times after another, or after rest; its status says whether the last was found.
+    """Solve equilibria at ascending times from a previous solution, or from rest.
 
     Args:
-        model: Everything.
-        history: What first guesses build on.
-        after: Where it begins; None at rest.
-        times: [frames] from the model's start.
-        loads: At a time, where not as the model has them.
-        method: The solver's; ``aitken`` relaxes the paper's loop.
-        halvings: How often a step may be halved; by default as long as it may help.
+        model: The contact model.
+        history: History for predictors and supports.
+        after: Solution to start from; None: from rest.
+        times: Times [frames from the model's start].
+        loads: External loads at a time; by default those of the model.
+        method: Solution method, see ``press``.
+        aitken: Whether the paper's loop uses Aitken relaxation.
+        halvings: Most halvings of a load step; by default as many as ``press`` allows.
+
+    Returns:
+        The solution; its status says whether the last time was reached.
     """
     return press(
         model.body,
@@ -77,19 +81,18 @@ def solve_branch(
     duration: float | None = None,
     halvings: int | None = None,
 ) -> ContactSolution:
-    """Equilibria along a way; functions of it are given the share of it that is done, 0 … 1.
+    """Solve equilibria along a trial branch; its functions take the branch parameter, 0 … 1.
 
     Args:
-        model: Everything.
-        history: What first guesses build on.
-        after: Where it begins.
-        steps: Equilibria on the way.
-        moves: A hand's name and what its bones do instead of the animation.
-        known: An object's name and what is prescribed for its nodes instead of its states and support.
-        nodal: Forces on all nodes beside the loads [N], shape (N, 3).
-        duration: Time it takes [frames].
-        halvings: How often a step may be halved: whether something holds is known much sooner than it is known that
-            nothing does.
+        model: The contact model.
+        history: History for predictors and supports.
+        after: Solution at which the branch starts.
+        steps: Number of load steps along the branch.
+        moves: Name of a hand, and the bone motions that replace those of the animation.
+        known: Name of an object, and the Dirichlet conditions that replace its state variables and support.
+        nodal: Additional nodal forces [N], shape (N, 3).
+        duration: Duration of the branch [frames]; None: the animation stands still.
+        halvings: Most halvings of a load step; a small number gives up early where there may be no equilibrium.
     """
     begin = after.last.time
     length = steps * _MOMENT if duration is None else duration

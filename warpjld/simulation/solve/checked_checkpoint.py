@@ -1,4 +1,4 @@
-"""Whether a state file holds what a run of this model leaves: shapes, types, finite numbers, frames in their order."""
+"""Validation of a checkpoint against the model: shapes, types, finite numbers and order of frames."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _TYPES: dict[str, Any] = {
     "float": (int, float),
     "float | None": (int, float, type(None)),
 }
-"""What JSON has for the types that records are annotated with."""
+"""Python types that JSON yields, by annotation of a record's field."""
 _UNKNOWN = ("bond_gap",)
-"""Fields of a contact state that are NaN where they are not known."""
+"""Fields of a contact state that may be NaN (unknown)."""
 
 
 def check_checkpoint(
@@ -36,15 +36,15 @@ def check_checkpoint(
     model: ContactModel,
     frames: Sequence[float],
 ) -> None:
-    """Make sure that a run of a model over some frames can go on from frames that are done.
+    """Check that a run of a model over ``frames`` can resume after the frames ``done``.
 
     Raises:
-        InputError: Not what such a run leaves; the first fault is named.
+        InputError: The checkpoint does not fit the model; names the first fault.
     """
     count, pairs = len(model.body.mesh.nodes), len(model.pairs)
     numbers = [one.frame for one in done]
     if numbers != [float(frame) for frame in frames[: len(numbers)]]:
-        raise InputError(f"it holds frames {_some(numbers)}; want the first ones of {_some(list(frames))}")
+        raise InputError(f"it holds frames {_listed(numbers)}; want the first ones of {_listed(list(frames))}")
     for one in done:
         what = f"frame {one.frame:g}"
         _check(one.displacement, (count, 3), f"{what}: displacements")
@@ -68,10 +68,10 @@ def check_checkpoint(
 
 
 def plain_record(kind: type[_T], content: Mapping[str, Any]) -> _T:
-    """A record of texts and finite numbers from what JSON holds of it.
+    """Instance of a dataclass of strings and finite numbers, from a JSON object.
 
     Raises:
-        InputError: Something else.
+        InputError: A field has another type, or is not finite.
     """
     for one in fields(kind):  # type: ignore[arg-type]
         value, want = content[one.name], _TYPES[str(one.type)]
@@ -115,5 +115,6 @@ def _check(array: Any, shape: tuple[int, ...], what: str, kind: Any = np.float64
         raise InputError(f"{what}: not finite")
 
 
-def _some(numbers: Sequence[float]) -> str:
+def _listed(numbers: Sequence[float]) -> str:
+    """The first four numbers as text."""
     return ", ".join(f"{number:g}" for number in numbers[:4]) + ", …" * (len(numbers) > 4)

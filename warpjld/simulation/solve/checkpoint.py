@@ -1,4 +1,4 @@
-"""Checkpoints: all frames solved so far and the state of contact, in one file, from which a run goes on."""
+"""Checkpoint files: solved frames and contact state, from which a run resumes."""
 
 from __future__ import annotations
 
@@ -31,24 +31,25 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame
 __all__ = ["Checkpoint", "CheckpointFile", "load_checkpoint", "save_checkpoint"]
 
 _NAMED = 6
-"""Parts that are named of what differs."""
+"""Most differing parts that a message names."""
 _KIND = "a state of a contact solve"
+"""Name of the file format in messages."""
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Frames so far, and the solution to go on from.
+    """Solved frames, and the state from which the run resumes.
 
     Attributes:
-        frames: In order.
-        solution: Of the last of them.
-        edits: Angles that were found on the way.
-        limits: Digits that have stopped: ``ForceLimits.content``.
-        missed: Touches between frames.
-        tight: Bones that came near to objects, and at which frame.
-        grips: Grips that were found, as plain values (``grip_content``).
-        edited: How many of the edits there were when each frame was solved.
-        identity: What it belongs to: hashes by name (see ``identity_of``).
+        frames: Solved frames in order.
+        solution: Solution of the last of them.
+        edits: Edits of the animation so far.
+        limits: State of the force limits, see ``ForceLimits.content``.
+        missed: Contacts between frames.
+        tight: Frame and smallest clearance between bone and object, by actor, digit and object.
+        grips: Grips found so far, as plain values (``grip_content``).
+        edited: Number of edits at the time each frame was solved.
+        identity: Hashes of the simulation it belongs to, by name of the part (see ``identity_of``).
     """
 
     frames: tuple[SolvedFrame, ...]
@@ -64,25 +65,25 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class CheckpointFile:
-    """Where a run keeps its checkpoint.
+    """A checkpoint file and the simulation it has to belong to.
 
     Attributes:
         path: The file.
-        belongs: What it is to belong to, found when it is first wanted.
+        belongs: Returns the identity of the simulation (see ``identity_of``); called when first needed.
     """
 
     path: Path
     belongs: Callable[[], Mapping[str, str]]
 
     def load(self, model: ContactModel, frames: Sequence[float]) -> Checkpoint | None:
-        """What an earlier run left; None where there is none.
+        """Checkpoint of an earlier run; None if the file does not exist.
 
         Args:
-            model: What is solved.
-            frames: At which.
+            model: The contact model to solve.
+            frames: Its frames.
 
         Raises:
-            InputError: It is no checkpoint, one of something else, or not what such a run leaves.
+            InputError: The file is no checkpoint, belongs to another simulation, or is inconsistent.
         """
         if not self.path.exists():
             return None
@@ -98,19 +99,19 @@ class CheckpointFile:
         return found
 
     def save(self, state: Checkpoint) -> None:
-        """Keep what was solved so far.
+        """Write the checkpoint.
 
         Raises:
-            InputError: It cannot be written.
+            InputError: The file cannot be written.
         """
         save_checkpoint(self.path, state, self.belongs())
 
 
 def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) -> None:
-    """Write it beside its place and rename it: a cut leaves the one before.
+    """Write a checkpoint atomically: an interruption leaves the previous file.
 
     Raises:
-        InputError: It cannot be written.
+        InputError: The file cannot be written.
     """
     solution = state.solution
     arrays: dict[str, Any] = {
@@ -124,7 +125,7 @@ def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) 
         "edited": np.array(state.edited, np.int64),
         "memories": len(solution.states),
     }
-    # one array a field, over all frames: a long run has no more members than a short one
+    # one array per field, stacked over frames, so that the number of members does not grow with the run
     for name in _names(SolvedFrame):
         arrays[f"frames.{name}"] = np.stack([getattr(frame, name) for frame in state.frames])
     for name in _names(NodalContact):
@@ -145,10 +146,10 @@ def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) 
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
-    """Read it.
+    """Read a checkpoint.
 
     Raises:
-        InputError: It is no state.
+        InputError: The file is no checkpoint.
     """
     check_input(path)
     with reading(path, _KIND):
@@ -199,5 +200,5 @@ def _json(file: Any, name: str) -> Any:
 
 
 def _names(kind: Any) -> list[str]:
-    """Fields of a record of arrays and numbers."""
+    """Names of a dataclass's fields, without nested records."""
     return [one.name for one in fields(kind) if one.name != "nodal_contact"]

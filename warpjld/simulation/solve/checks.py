@@ -1,4 +1,4 @@
-"""What cannot work, found before it is tried."""
+"""Validation of specification and model before anything is solved."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from warpjld.simulation.specification import (
 __all__ = ["check_model", "check_specification"]
 
 _APART = 0.3
-"""Gap, in elements, that a bond still bridges."""
+"""Largest gap across which two objects can be bonded, in element edges."""
 
 _ON = 2e-4
-"""Gap from which on an object stands on what is below it [m]."""
+"""Gap below which an object counts as standing on what is below it [m]."""
 
 
 def check_specification(animation: Animation, contact: ContactSpecification, request: SolveSpecification) -> None:
-    """Refuse names that there are none of, and grips and corrections that cannot be, before anything is meshed.
+    """Reject unknown names and impossible grips and corrections, before anything is meshed.
 
     Raises:
-        InputError: Names the command's line.
+        InputError: With the command's line, if there is one.
     """
     contact.check()
     for kind, names, known in (
@@ -85,11 +85,11 @@ def _check_grip(contact: ContactSpecification, grip: GripSpecification, request:
 
 
 def check_model(model: ContactModel, contact: ContactSpecification) -> None:
-    """Refuse bonds between bodies that do not meet, objects inside flesh, lifting what stands on something else, and
-    skin that begins deeper in something than contact looks (R112).
+    """Reject bonds across a gap, objects inside flesh, lifted objects that stand on others, and initial overlaps deeper
+    than the search distance of contact (R112).
 
     Raises:
-        InputError: Names the command's line.
+        InputError: With the command's line, if there is one.
     """
     surfaces = {one.name: outer_surface(one.mesh, one.faces) for one in model.objects}
     for bonded in contact.bonds:
@@ -114,10 +114,10 @@ def check_model(model: ContactModel, contact: ContactSpecification) -> None:
 
 
 def _refuse_apart(surfaces: Mapping[str, Facets], bonded: BondStrength) -> None:
-    """Refuse a bond between objects that do not meet.
+    """Reject a bond between objects that are apart.
 
     Raises:
-        InputError: Names the command's line.
+        InputError: With the command's line, if there is one.
     """
     one, other = surfaces[bonded.one], surfaces[bonded.other]
     gap = float(other.project(one.vertices).distance.min())
@@ -128,10 +128,10 @@ def _refuse_apart(surfaces: Mapping[str, Facets], bonded: BondStrength) -> None:
 
 
 def _refuse_deep(model: ContactModel, hand: FleshBody, surfaces: Mapping[str, Facets]) -> None:
-    """Refuse skin that begins deeper in an object than overlap is parted from.
+    """Reject initial overlaps of skin that are deeper than contact can remove.
 
     Raises:
-        InputError: Names the digits and what they are in.
+        InputError: Names the digits and the object.
     """
     skin = surface_of(hand.mesh, hand.faces, hand.name)
     x, most = hand.mesh.nodes[skin.nodes], skin.reach
@@ -149,7 +149,7 @@ def _refuse_deep(model: ContactModel, hand: FleshBody, surfaces: Mapping[str, Fa
 
 
 def _below(model: ContactModel, surfaces: dict[str, Facets], name: str) -> str:
-    """What an object stands on at time 0, or nothing."""
+    """Name of the body an object stands on at time 0; empty if there is none."""
     up = -np.array(model.loads.gravity) / np.linalg.norm(model.loads.gravity)
     points = surfaces[name].vertices
     found = {other: obstacle.project(points, 0.0) for other, obstacle in model.obstacles.items()}

@@ -1,4 +1,4 @@
-"""Digits that flex no farther than they may: ramps of the most that their joints flex by."""
+"""Upper bounds on the flexions of a digit that vary linearly over time."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["FlexionRamp", "closing_joints", "held_angles"]
 
 @dataclass(frozen=True)
 class FlexionRamp:
-    """The most that joints of a digit flex by, at two times and straight between them.
+    """Largest flexions of a digit's joints, interpolated linearly between two times.
 
     Attributes:
-        begin, end: The times.
-        most: Flexions there [rad], by joint.
+        begin, end: The times [frames].
+        most: Largest flexions at both times [rad], by joint.
     """
 
     begin: float
@@ -29,14 +29,14 @@ class FlexionRamp:
     most: Mapping[int, tuple[float, float]]
 
     def at(self, joint: int, time: float) -> float:
-        """At a time, the nearer end's outside."""
-        one, other = self.most[joint]
+        """Largest flexion of a joint at a time [rad]; constant outside the ramp."""
+        first, last = self.most[joint]
         share = (time - self.begin) / (self.end - self.begin) if self.end > self.begin else 1.0
-        return one + min(1.0, max(0.0, share)) * (other - one)
+        return first + min(1.0, max(0.0, share)) * (last - first)
 
 
 def held_angles(angles: NDArray[np.float64], ramps: Iterable[FlexionRamp], time: float) -> NDArray[np.float64]:
-    """Joint angles [rad], shape (J, 4), none flexed farther than ramps have it at a time."""
+    """Joint angles [rad], shape (J, 4), with flexions limited by ramps at a time."""
     out = np.array(angles)
     for ramp in ramps:
         for joint in ramp.most:
@@ -45,7 +45,7 @@ def held_angles(angles: NDArray[np.float64], ramps: Iterable[FlexionRamp], time:
 
 
 def closing_joints(skeleton: Skeleton) -> dict[str, list[int]]:
-    """Joints that close each digit of a skeleton: ``left.index``, …, or ``index``."""
+    """Indices of the joints that close each digit of a skeleton, by name: ``left.index``, …, or ``index``."""
     out: dict[str, list[int]] = {}
     for joint, name in enumerate(skeleton.names):
         digit, _, knuckle = name.rpartition(".")

@@ -1,4 +1,4 @@
-"""What digits press with at an equilibrium, over what they may: muscles' limits, and a pressure (R118)."""
+"""Loads of digits at an equilibrium relative to their limits: muscles, skin pressure, balance of the grasp (R118)."""
 
 from __future__ import annotations
 
@@ -13,28 +13,27 @@ from warpjld.fem.hand.bone_loads import loads_from_contact
 from warpjld.fem.hand.muscles import effort_of
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.bodies.skin_parts import digit_of_label
 from warpjld.simulation.solve.grasp_balance import allowed_net
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 
 __all__ = ["CRUSHING", "DigitLoad", "digit_loads", "peaks_of"]
 
 CRUSHING = 1e6
-"""Pressure on skin from which on flesh is crushed [Pa]: hardly any is left, and no law of it was measured there."""
+"""Pressure on skin above which its flesh counts as crushed [Pa]: laws of flesh were never measured there."""
 
 
 @dataclass(frozen=True)
 class DigitLoad:
-    """One digit.
+    """Loads of one digit.
 
     Attributes:
-        actor: Whose.
-        digit: As the skeleton has it: ``left.index``, or ``index``.
+        actor: Name of the actor.
+        digit: Name in the skeleton: ``left.index``, or ``index``.
         force: Sum of the contact forces on its bones [N].
-        muscles: The largest share of the limits of its force and of its joints' torques.
+        muscles: Largest ratio of its force or joint torques to their limits.
         peak: Highest pressure on its skin [Pa].
-        unopposed: Net force on the object that it pushes along with it, over what may be left over; 0 where it opposes.
-        pushed: That object.
+        unopposed: Net force on a grasped object over the allowed one, if the digit pushes in its direction; else 0.
+        pushed: Name of that object.
     """
 
     actor: str
@@ -46,11 +45,11 @@ class DigitLoad:
     pushed: str = ""
 
     def share(self, pressure: float) -> float:
-        """What it does over what it may, where its skin may be pressed with ``pressure`` [Pa]."""
+        """Largest ratio of load to limit, where ``pressure`` [Pa] is the limit of its skin."""
         return max(self.muscles, self.peak / pressure, self.unopposed)
 
     def bound(self, pressure: float) -> str:
-        """What ``share`` is about, in words."""
+        """Which limit determines ``share``, in words."""
         if self.unopposed >= self.share(pressure):
             return f"nothing opposes it, it would push {self.pushed} away"
         if self.muscles >= self.peak / pressure:
@@ -66,15 +65,15 @@ def digit_loads(
     limits: Mapping[str, float] | None,
     weights: Mapping[str, float],
 ) -> dict[str, DigitLoad]:
-    """By digit. Contact forces are handed on to the bones by nearness: no equilibrium of the flesh alone is needed.
+    """Loads by digit; contact forces are assigned to the nearest bones, which needs no equilibrium of the flesh alone.
 
     Args:
-        model: Everything.
-        hand: Whose.
-        angles: Joint angles there [rad], shape (J, 4).
+        model: The contact model.
+        hand: The hand.
+        angles: Its joint angles at the equilibrium [rad], shape (J, 4).
         instant: The equilibrium.
-        limits: Digit → largest force [N], where it is not the default.
-        weights: What objects may weigh that hands alone are to hold, by name [N].
+        limits: Digit → force limit that differs from the default [N].
+        weights: Assumed weights of objects that only hands hold, by name [N].
     """
     span = model.spans[hand.name]
     nodal = sum((touch.nodal[span] for touch in instant.touches), np.zeros((span.stop - span.start, 3)))
@@ -94,8 +93,9 @@ def digit_loads(
 def _pushes(
     model: ContactModel, hand: FleshBody, instant: ContactInstant, weights: Mapping[str, float]
 ) -> dict[str, tuple[str, float]]:
-    """By digit the object that it pushes along with what is left over, and that over what may be."""
-    digit_of = _digits(hand)
+    """By digit that pushes in the direction of the net force on an object: the object, and that force over the allowed
+    one."""
+    digit_of = hand.node_digits
     out: dict[str, tuple[str, float]] = {}
     for name, weight in weights.items():
         force = np.zeros_like(instant.displacement)
@@ -111,14 +111,8 @@ def _pushes(
     return out
 
 
-def _digits(hand: FleshBody) -> NDArray[np.str_]:
-    """Digit of every node, or the palm; empty for nodes inside."""
-    labels = [digit_of_label(name) for name in hand.hand.label_names]
-    return np.array([*labels, ""])[hand.hand.node_labels]
-
-
 def peaks_of(model: ContactModel, hand: FleshBody, solved: SolvedFrame) -> dict[str, float]:
-    """Highest pressure on the skin of each digit, and the palm's [Pa]."""
-    digit_of = _digits(hand)
+    """Highest pressure on the skin of each digit and the palm [Pa]."""
+    digit_of = hand.node_digits
     pressure = solved.pressure(model)[model.spans[hand.name]]
     return {name: float(pressure[digit_of == name].max(initial=0.0)) for name in dict.fromkeys(digit_of)}

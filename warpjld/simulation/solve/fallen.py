@@ -1,4 +1,4 @@
-"""What is asked of contact once free objects have fallen: from where, and which of them take part (R139)."""
+"""Contact problem after free objects have fallen: start frame, participating objects, their rigid motion (R139)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from warpjld.grasp import GraspObject, Places
 from warpjld.simulation.animation import ActorAnimation, AngleEdit, Animation, ObjectAnimation
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.bodies.obstacle import rigid_obstacle
+from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 from warpjld.simulation.fall.rigid_body import RigidBody, rigid_shape
 from warpjld.simulation.solve.falling import FallPath
 from warpjld.simulation.solve.solved_frame import SolvedFrame
@@ -27,33 +27,28 @@ if TYPE_CHECKING:
 __all__ = ["FallenAnimation", "FallenObject", "fallen_start", "moved_by", "released_bodies", "taking_part", "without"]
 
 _NEXT = 1.0
-"""Frames after the last that was solved: what is prescribed of an object then holds it."""
+"""Frames after the last solved one at which an object with Dirichlet conditions counts as held."""
 
 
 @dataclass(frozen=True, eq=False)
 class FallenObject:
-    """An object on its path, as a simulation asks for it."""
+    """Animation of an object along its fall path (implements ``ObjectAnimation``)."""
 
     name: str
     thing: GraspObject
     path: FallPath
 
     def place(self, frame: float) -> Places:
-        """Where it is."""
+        """Placement at a frame."""
         return self.path.at(frame)
 
     def obstacle(self, start: float) -> Obstacle:
-        """It as something that does not give way; the obstacle's time is in frames from ``start``."""
-
-        def motion(time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            here = self.path.at(start + time)
-            return here.position[0], here.rotation[0]
-
-        return rigid_obstacle(self.thing, motion)
+        """The object as a rigid obstacle; times of the obstacle are in frames from ``start``."""
+        return rigid_obstacle(self.thing, placed_motion(self.path.at, start))
 
 
 class FallenAnimation:
-    """An animation in which some objects go where they fall."""
+    """Animation in which some objects follow their fall paths."""
 
     def __init__(self, animation: Animation, paths: Mapping[str, FallPath]) -> None:
         self._animation, self._paths = animation, paths
@@ -62,23 +57,23 @@ class FallenAnimation:
 
     @property
     def actors(self) -> Mapping[str, ActorAnimation]:
-        """As they were."""
+        """Actors of the original animation."""
         return self._animation.actors
 
     @property
     def objects(self) -> Mapping[str, ObjectAnimation]:
-        """In their order on the stage."""
+        """Objects in scene order."""
         return self._objects
 
     def edited(self, edits: Sequence[AngleEdit]) -> FallenAnimation:
-        """The same with edits laid over its actors; what falls stays the same object."""
+        """A copy with edits applied to its actors; falling objects remain the same instances."""
         out = FallenAnimation(self._animation.edited(edits), self._paths)
         out._objects |= {name: self._objects[name] for name in self._paths}
         return out
 
 
 def fallen_start(paths: Mapping[str, FallPath], first: float, last: float) -> float:
-    """Frame from which on contact is solved with what has fallen: when all rest, or before the first is held."""
+    """Frame from which contact is solved with fallen objects: when all rest, or just before the first is held."""
     held = [path.held for path in paths.values() if path.held is not None]
     if held:
         return max(first, np.ceil(min(held)) - 1.0)
@@ -86,13 +81,13 @@ def fallen_start(paths: Mapping[str, FallPath], first: float, last: float) -> fl
 
 
 def without(contact: ContactSpecification, names: Sequence[str]) -> ContactSpecification:
-    """The same in which some objects do not deform."""
+    """A copy of the specification in which some objects do not deform."""
     physical = {name: matter for name, matter in contact.physical.items() if name not in names}
     return replace(contact, physical=physical)
 
 
 def taking_part(paths: Mapping[str, FallPath], start: float) -> list[str]:
-    """Objects that rest at a frame, or are held."""
+    """Names of objects that rest at a frame, or are held."""
     return [
         name
         for name, path in paths.items()
@@ -103,13 +98,13 @@ def taking_part(paths: Mapping[str, FallPath], start: float) -> list[str]:
 def released_bodies(
     model: ContactModel, frames: Sequence[SolvedFrame], contact: ContactSpecification, rate: float
 ) -> dict[str, RigidBody]:
-    """Objects that nothing prescribes after the last frame that was solved, as rigid bodies that move as they do there.
+    """Unconstrained objects after the last solved frame, as rigid bodies with their placement and velocity there.
 
     Args:
-        model: What was solved.
-        frames: Those that were; the last two tell velocities.
-        contact: Weights and bonds.
-        rate: Frames a second.
+        model: The contact model.
+        frames: Solved frames; velocities are differences of the last two.
+        contact: Specification with weights and bonds.
+        rate: Frames per second.
     """
     bonded = {name for bond in contact.bonds for name in (bond.one, bond.other)}
     out = {}
@@ -132,14 +127,14 @@ def released_bodies(
 
 
 def _fitted(local: NDArray[np.float64], shape: NDArray[np.float64]) -> Places:
-    """The place of a body whose points (n, 3) lie nearest to others (n, 3)."""
+    """Placement that fits points (n, 3) to others (n, 3) in the least-squares sense (Kabsch)."""
     here, there = local.mean(axis=0), shape.mean(axis=0)
     turn = Rotation.align_vectors(shape - there, local - here)[0]
     return Places((there - turn.apply(here))[None], turn.as_quat()[None])
 
 
 def moved_by(paths: Mapping[str, FallPath], before: StartFrame, inside: Sequence[str]) -> StartFrame:
-    """The start of contact, with the ways of what fell: up to the start of what takes part, all of the others'."""
+    """``before`` with the fall paths added: up to the start for objects that take part in contact, whole for others."""
     moved = dict(before.moved)
     for name, path in paths.items():
         end = before.start if name in inside else np.inf
@@ -148,5 +143,5 @@ def moved_by(paths: Mapping[str, FallPath], before: StartFrame, inside: Sequence
         if name in inside:
             frames, places = [*frames, before.start], [*places, path.at(before.start)]
         moved[name] = (frames, places)
-    told = tuple(text for path in paths.values() if (text := path.told()))
-    return replace(before, moved=moved, falls=told)
+    falls = tuple(text for path in paths.values() if (text := path.summary()))
+    return replace(before, moved=moved, falls=falls)

@@ -1,8 +1,8 @@
-"""What nothing holds falls: free objects with weight are followed as rigid bodies until they rest, or are held (R139).
+"""Rigid-body fall of unsupported objects until they rest or hands hold them by friction (R139).
 
-Contact of deformable bodies is a matter of equilibria, and what falls has none. So an object with weight that no hand
-holds and nothing prescribes goes its way as a rigid body (``simulation.fall``), from frame to frame. Where it has come
-to rest, or hands hold it by friction, the search for equilibria begins.
+Contact of deformable bodies is solved quasi-statically, and a falling object has no equilibrium. So an object with
+weight that no hand holds and no Dirichlet condition constrains is integrated as a rigid body (``simulation.fall``)
+frame by frame. The quasi-static solve starts when it rests or is held.
 """
 
 from __future__ import annotations
@@ -25,30 +25,30 @@ from warpjld.simulation.specification import ContactSpecification, SolveSpecific
 __all__ = ["FallPath", "falling_names", "follow_falls"]
 
 _STILL = 1e-2
-"""Speed below which a touching body rests [m/s]."""
+"""Speed below which a body may be at rest [m/s]."""
 _QUIET = 0.25
-"""How long it must be slower than that [s]."""
+"""Time for which it must be slower than that [s]."""
 _CLOSE = 0.01
-"""Surfaces are looked at nearer than this [m]."""
+"""Margin of the bounding boxes within which an actor counts as near a body [m]."""
 _PRESSED = 2e-4
-"""Skin deeper than this inside an object presses on it [m]."""
+"""Depth of skin inside an object from which it counts as pressing on it [m]."""
 _MOVED = 2e-4
-"""Way that is a fall [m]: less is what lies there settling."""
+"""Displacement from which a fall is reported [m]; less is the settling of an object at rest."""
 
 
 @dataclass(eq=False)
 class FallPath:
-    """Where a free object goes.
+    """Path of a free object.
 
     Attributes:
-        name: Of the object.
-        frames: Rising.
-        places: At those.
-        rests: Frame from which on it rests; None: it still moves at the last.
-        on: What it rests on.
-        left: Frame at which it is below everything, with nothing to fall on; None if it never is.
+        name: Name of the object.
+        frames: Frame numbers, ascending.
+        places: Placements at these frames.
+        rests: Frame from which on it rests; None: it still moves at the last frame.
+        on: Names of what it rests on.
+        left: Frame at which it is below everything it could fall on; None if it never is.
         held: Frame at which hands hold it; None if they never do.
-        speed: At the last frame [m/s].
+        speed: Speed at the last frame [m/s].
     """
 
     name: str
@@ -61,7 +61,7 @@ class FallPath:
     speed: float = 0.0
 
     def at(self, frame: float) -> Places:
-        """Where it is; before the first frame and after the last as it is then."""
+        """Placement at a frame, interpolated; constant before the first and after the last frame."""
         k = int(np.clip(np.searchsorted(self.frames, frame + 1e-9) - 1, 0, len(self.frames) - 1))
         if k + 1 == len(self.frames) or frame <= self.frames[k]:
             return self.places[k]
@@ -71,14 +71,14 @@ class FallPath:
         return Places.of((1.0 - part) * one.position + part * two.position, (1.0 - part) * one.rotation + part * turn)
 
     @property
-    def way(self) -> float:
-        """How far it has come [m]."""
+    def distance(self) -> float:
+        """Largest distance from its first position [m]."""
         first = self.places[0].position
         return max(float(np.linalg.norm(place.position - first)) for place in self.places)
 
-    def told(self) -> str:
-        """``BALL falls from frame 0 on and comes to rest on BOWL at frame 61``; nothing where it did not move."""
-        if self.way < _MOVED and self.rests is not None:
+    def summary(self) -> str:
+        """``BALL … falls from frame 0 on, and comes to rest on BOWL at frame 61``; empty if it did not fall."""
+        if self.distance < _MOVED and self.rests is not None:
             return ""
         begun = f"{self.name} is held by nothing: it falls from frame {self.frames[0]:g} on"
         if self.left is not None:
@@ -91,7 +91,7 @@ class FallPath:
 
 
 def falling_names(contact: ContactSpecification, request: SolveSpecification) -> list[str]:
-    """Objects with weight that nothing prescribes, bonds or is to lift."""
+    """Deformable objects with weight and without Dirichlet conditions, bonds, loads or a grip that lifts them."""
     if request.method == "paper" or not any(contact.pull):
         return []
     stands = {name for name, _ in contact.prescribed} | {grip.object for grip in contact.grips if grip.lift}
@@ -109,15 +109,16 @@ def follow_falls(
     released: Mapping[str, RigidBody] | None = None,
     first: float | None = None,
 ) -> dict[str, FallPath]:
-    """Paths of free objects, each until the last frame, or until hands hold it.
+    """Fall paths of free objects, each until the last frame or until hands hold it.
 
     Args:
-        animation: What else moves.
-        contact: Friction, weights and whose flesh may hold.
-        request: Frames and their rate.
-        names: The free objects.
-        released: Of objects that hands let go, how they move at the ``first`` frame: hands hold them no more.
-        first: Frame to begin at, where not the request's first.
+        animation: Motion of everything else.
+        contact: Specification with friction, weights and actors with flesh.
+        request: Frames and frame rate.
+        names: Names of the free objects.
+        released: Rigid bodies at the ``first`` frame, for objects that hands have released; hands then no longer hold
+            them.
+        first: First frame; by default the request's.
     """
     stage = _Stage(animation, contact, request, float(request.first) if first is None else first, bool(released))
     for name in names:
@@ -129,7 +130,7 @@ def follow_falls(
 
 @dataclass(eq=False)
 class _Stage:
-    """Bodies that fall, and all else as obstacles; obstacles' times are frames from ``start``."""
+    """Falling bodies, with everything else as obstacles; times of obstacles are in frames from ``start``."""
 
     animation: Animation
     contact: ContactSpecification
@@ -139,15 +140,15 @@ class _Stage:
     bodies: dict[str, RigidBody] = field(default_factory=dict)
     paths: dict[str, FallPath] = field(default_factory=dict)
     quiet: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """Of bodies that hardly move: frame since when, and for how long [s]."""
+    """Slow bodies: frame since when, and for how long [s]."""
 
     def add(self, body: RigidBody) -> None:
-        """Let an object fall from the start on."""
+        """Add an object that falls from the start frame on."""
         self.bodies[body.shape.name] = body
         self.paths[body.shape.name] = FallPath(body.shape.name, [self.start], [body.place])
 
     def followed(self) -> dict[str, FallPath]:
-        """Frame after frame, until all are done."""
+        """Integrate frame by frame until all bodies rest, are held or have left the scene."""
         solids = {
             name: one.obstacle(self.start) for name, one in self.animation.objects.items() if name not in self.bodies
         }
@@ -164,11 +165,11 @@ class _Stage:
         return self.paths
 
     def _moving(self) -> bool:
-        """Whether anything is not done: what rests may be hit by what does not."""
+        """Whether any body still moves; bodies at rest stay in the simulation, as they may be hit."""
         return any(self.paths[name].rests is None for name in self.bodies)
 
     def _frame(self, before: float, after: float, solids: Mapping[str, Obstacle]) -> None:
-        """From one frame to the next."""
+        """Integrate from one frame to the next."""
         rate, gravity = self.request.rate, np.array(self.contact.pull, np.float64)
         count = steps_of(after - before, rate)
         step = (after - before) / count
@@ -196,11 +197,11 @@ class _Stage:
                 del self.bodies[name]
 
     def _note(self, name: str, frame: float, length: float) -> None:
-        """Whether a body rests."""
+        """Update whether a body is at rest: slow for long enough, which it cannot be in the air."""
         body, path = self.bodies[name], self.paths[name]
         if body.touching:
             path.on = body.touching
-        if body.speed > _STILL:  # in the air it is so slow for a moment only
+        if body.speed > _STILL:
             self.quiet.pop(name, None)
             path.rests = None
             return
@@ -210,7 +211,7 @@ class _Stage:
             path.rests = float(np.ceil(since - 1e-6))
 
     def _skins(self, before: float, after: float) -> dict[str, Obstacle]:
-        """Actors' surfaces between two frames."""
+        """Surfaces of actors near any body between two frames, as keyframed obstacles by name."""
         out: dict[str, Obstacle] = {}
         for name, actor in self.animation.actors.items():
             shapes = np.stack([actor.skin(before), actor.skin(after)])
@@ -221,7 +222,7 @@ class _Stage:
         return out
 
     def _lost(self, body: RigidBody, solids: Mapping[str, Obstacle], frame: float) -> bool:
-        """Whether a body is below everything else."""
+        """Whether a body is below everything else, so that nothing can stop it."""
         down = np.array(self.contact.pull) / np.linalg.norm(self.contact.pull)
         others = [solid.mesh(frame - self.start)[0] for solid in solids.values()]
         others += [actor.skin(frame) for actor in self.animation.actors.values()]
@@ -230,7 +231,7 @@ class _Stage:
         return float((body.points @ down).min()) > max(float((points @ down).max()) for points in others)
 
     def _hold(self, frame: float, solids: dict[str, Obstacle]) -> None:
-        """Take out what hands hold by friction: from here on it stays in its place for all others."""
+        """Turn bodies that hands hold by friction into fixed obstacles for the others."""
         if self.released:
             return
         skins = {name: self.animation.actors[name].skin(frame) for name in self.contact.flesh}
@@ -252,7 +253,7 @@ class _Stage:
 
 
 def _meet(shapes: NDArray[np.float64], body: RigidBody, length: float) -> bool:
-    """Whether a surface (2, V, 3) comes near to a body within some seconds, at the ends of them."""
-    reach = body.shape.reach + length * (body.speed + 9.81 * length) + _CLOSE
+    """Whether the box of a surface at two times (2, V, 3) comes near a body that falls for ``length`` seconds."""
+    reach = body.shape.reach + length * (body.speed + 9.81 * length) + _CLOSE  # free fall at 9.81 m/s²
     low, high = shapes.min(axis=(0, 1)) - reach, shapes.max(axis=(0, 1)) + reach
     return bool((body.centre > low).all() and (body.centre < high).all())

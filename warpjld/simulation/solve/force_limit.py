@@ -1,11 +1,12 @@
-"""Digits that close no farther than their muscles can press, or than their skin bears (R118, R119).
+"""Force-limited closing of digits: a digit stops where its muscles or its skin reach their limits (R118, R119).
 
-An animation closes digits by angles; how hard they then press is left to the flesh, which stiffens without bound
-between a bone and a wall. No hand does that. A digit whose load reaches its limit keeps the flexions it has there,
-while all others go on; it goes on itself when its load has fallen, and opens as the animation does.
+An animation closes digits by prescribed angles; the resulting forces are those of the flesh, which stiffens without
+bound between a bone and a wall. A real hand is limited by force. So a digit whose load reaches a limit keeps its
+flexions there while the other digits go on; it continues when its load has dropped, and opens as the animation does.
 
-Where between two equilibria a digit reaches its limit is found by a chord: forces of flesh grow ever faster, so that
-the chord's point lies short of the limit, never beyond it. What ends well short of it goes on at the next frame.
+The angle at which a digit reaches its limit between two equilibria is found by a chord (secant): forces of flesh are
+convex in the angle, so the chord's point lies short of the limit, never beyond it. A digit that ends well short of its
+limit continues at the next frame.
 """
 
 from __future__ import annotations
@@ -34,43 +35,44 @@ __all__ = ["BoneInsideError", "ForceLimits", "Stop"]
 
 
 class BoneInsideError(WarpjldError):
-    """A bone that would lie in an object, in words with the frame."""
+    """A bone would lie inside an object; the message names the frame."""
 
 
 _Key = tuple[str, str]
-"""An actor and its digit, as the skeleton has it."""
+"""Name of an actor, and of its digit in the skeleton."""
 
 _SAME = 1e-9
-"""Angles that do not differ [rad]."""
+"""Tolerance for equal angles [rad]; also for rounding of step counts."""
 
 _AIM = 0.97
-"""Share of the limits at which digits stop: the table's loads differ from those by nearness by a few percent."""
+"""Load to limit ratio at which digits stop; below 1 because loads by nearest bones differ from those of the table by a
+few percent."""
 _RELAXED = 0.8
-"""Share of them below which a digit that has stopped goes on."""
+"""Load to limit ratio below which a stopped digit continues."""
 _TRIES = 3
-"""Times a step is looked for again with digits that stop in its course; then they stay as they were before it."""
+"""Times a step is repeated with digits that stop within it; after that they stop at its beginning."""
 _HALVINGS = 2
-"""Times a step may be halved as long as digits could stop instead."""
+"""Most halvings of a load step as long as digits can stop instead."""
 _SPENT = 0.25
-"""Share of the flesh over a bone that is left where a digit stops whatever its load: pressures are far beyond any limit
-there, and equilibria hard to find."""
+"""Relative thickness of the flesh over a bone at which a digit stops whatever its load: pressures there are far beyond
+any limit, and equilibria hard to find."""
 _SQUEEZED = 0.15
-"""Share of the flesh over a bone by which one step squeezes it at most: forces double meanwhile."""
+"""Largest change of the relative thickness of flesh over a bone in one step; forces double meanwhile."""
 _PARTS = (1.0, 0.5, 0.25, 0.125)
-"""Parts of what it lags behind by that a digit may make up for in a step."""
+"""Fractions of its lag behind the animation that a digit may recover in one step, tried in turn."""
 _LOOKS = 8
-"""Places on a step's way at which that is looked for."""
+"""Intervals into which a step is divided to find where a bone comes too near."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A digit that stopped.
+    """A digit that stopped at a limit.
 
     Attributes:
-        actor: Whose.
-        digit: As the skeleton has it.
-        frame: From which on.
-        why: In words.
+        actor: Name of the actor.
+        digit: Name of the digit in the skeleton.
+        frame: Frame from which on it keeps its flexions.
+        why: Reason in words.
     """
 
     actor: str
@@ -81,14 +83,14 @@ class Stop:
 
 @dataclass(eq=False)
 class ForceLimits:
-    """Which digits have stopped, and where.
+    """State of the force limits: which digits have stopped, and at which flexions.
 
     Attributes:
-        strength: Largest forces of digits [N], by actor and digit, where they are not the default.
-        pressure: What skin bears [Pa].
-        weights: What objects may weigh that hands alone are to hold, by name [N].
-        clearance: Of the bones.
-        stops: Digits that stopped, the first time each.
+        strength: Force limits of digits that differ from the default [N], by actor and digit.
+        pressure: Pressure limit of skin [Pa].
+        weights: Assumed weights of objects that only hands hold, by name [N].
+        clearance: Clearance of the bones.
+        stops: Digits that stopped, each the first time.
     """
 
     strength: Mapping[str, Mapping[str, float]]
@@ -103,17 +105,17 @@ class ForceLimits:
     def solve(
         self, model: ContactModel, history: History, before: ContactSolution | None, times: Sequence[float]
     ) -> ContactSolution:
-        """Equilibria at rising times, as ``solve_onward`` has them; digits that reach their limits stop on the way.
+        """Solve equilibria at ascending times like ``solve_onward``, stopping digits that reach their limits.
 
         Raises:
-            BoneInsideError: A bone would come to lie in an object by no closing of its digit.
+            BoneInsideError: A bone would enter an object although its digit does not close.
         """
         if not _bendable(model):
             return solve_onward(model, history, before, times)
         reached: list[ContactInstant] = []
         now = 0.0 if before is None else before.last.time
-        self._look_along(model, now, times)
-        for time in self._finer(model, now, times):
+        self._check_bones(model, now, times)
+        for time in self._refined(model, now, times):
             found = self._step(model, history, before, now, time)
             if not found.converged:
                 return replace(found, instants=(*reached, found.last))
@@ -123,7 +125,7 @@ class ForceLimits:
         return replace(before, instants=tuple(reached))
 
     def content(self) -> dict[str, Any]:
-        """As plain values, for a run that goes on."""
+        """State as plain values, for a checkpoint."""
         return {
             "caps": [[*key, ramp.begin, ramp.end, list(ramp.most.items())] for key, ramp in self._caps.items()],
             "loads": [asdict(load) for load in self._loads.values()],
@@ -132,7 +134,7 @@ class ForceLimits:
         }
 
     def restore(self, content: Mapping[str, Any]) -> None:
-        """Go on from what ``content`` gave."""
+        """Restore the state that ``content`` returned."""
         self._caps = {
             (actor, digit): FlexionRamp(begin, end, {joint: tuple(most) for joint, most in joints})
             for actor, digit, begin, end, joints in content.get("caps", [])
@@ -143,7 +145,7 @@ class ForceLimits:
         self.stops = [Stop(**stop) for stop in content.get("stops", [])]
 
     def edits(self, model: ContactModel, since: float, time: float) -> tuple[AngleEdit, ...]:
-        """Angles at a time of digits that have stopped since another."""
+        """Edits of the animation at ``time`` for flexions that are limited, valid after ``since``."""
         out = []
         for hand in _bendable(model):
             wanted, reached = hand.bones.angles(time)[:, FLEXION], self._angles(hand, time)[:, FLEXION]
@@ -153,19 +155,19 @@ class ForceLimits:
         return tuple(out)
 
     def driven(self, model: ContactModel) -> ContactModel:
-        """The model with digits that have stopped."""
+        """The model with the flexions of stopped digits limited."""
         stopped = {actor for actor, _ in self._caps}
-        hands = [self._held(hand) if hand.name in stopped else hand for hand in model.hands]
+        hands = [self._capped(hand) if hand.name in stopped else hand for hand in model.hands]
         return replace(model, hands=tuple(hands))
 
-    def _held(self, hand: FleshBody) -> FleshBody:
-        caps = [ramp for (actor, _), ramp in self._caps.items() if actor == hand.name]  # as they are now
+    def _capped(self, hand: FleshBody) -> FleshBody:
+        caps = [ramp for (actor, _), ramp in self._caps.items() if actor == hand.name]  # a copy: self._caps changes
         return replace(
             hand, moves=lambda time: hand.bones.moves_of(held_angles(hand.bones.angles(time), caps, time), time)
         )
 
-    def _finer(self, model: ContactModel, now: float, times: Sequence[float]) -> list[float]:
-        """Times with others between, so that in no step a bone's flesh is squeezed by too much."""
+    def _refined(self, model: ContactModel, now: float, times: Sequence[float]) -> list[float]:
+        """Times with intermediate ones inserted, so that no step compresses the flesh over a bone by too much."""
         out: list[float] = []
         driven = self.driven(model)
         left = self._left(driven, now)
@@ -177,44 +179,43 @@ class ForceLimits:
             left, now = then, time
         return out
 
-    def _look_along(self, model: ContactModel, now: float, times: Sequence[float]) -> None:
-        """Refuse a way of several steps on which a bone comes to lie in an object, if its digit does not close on it
-        and so cannot stop.
+    def _check_bones(self, model: ContactModel, now: float, times: Sequence[float]) -> None:
+        """Reject several steps in which a bone enters an object while its digit does not close, and so cannot stop.
 
         Raises:
-            BoneInsideError: Where it first does.
+            BoneInsideError: At the first such time.
         """
-        if len(times) < 2:  # each step looks at its own end
+        if len(times) < 2:  # a single step is checked in _step
             return
         driven, closing = self.driven(model), self._closing(model, now, times[-1])
         for time in times:
-            inside = [one for one in self.clearance.nearest(driven, time) if one.left <= 0.0]
-            carried = [one for one in inside if _key_of(closing, one) is None]
+            inside = [bone for bone in self.clearance.nearest(driven, time) if bone.left <= 0.0]
+            carried = [bone for bone in inside if _key_of(closing, bone) is None]
             if carried:
-                worst = min(carried, key=lambda one: one.left)
+                worst = min(carried, key=lambda bone: bone.left)
                 raise BoneInsideError(f"at frame {model.start + time:.4g}: {worst.text}")
 
     def _left(self, model: ContactModel, time: float) -> dict[tuple[str, str, str], float]:
-        """Share of flesh that is left before bones, by actor, digit and object."""
+        """Relative thickness of the flesh over bones, by actor, digit and object."""
         return {(one.actor, one.digit, one.object): one.left for one in self.clearance.nearest(model, time)}
 
     def _step(
         self, model: ContactModel, history: History, before: ContactSolution | None, now: float, time: float
     ) -> ContactSolution:
-        """One step; again with digits that stop earlier, until none is over its limit that still closes."""
+        """One step, repeated with digits stopped earlier until no closing digit is above its limit."""
         self._relax(model, now, time)
         self._spare_bones(model, now, time)
         if (inside := self.clearance.inside(self.driven(model), time)) is not None:
             raise BoneInsideError(inside)
-        for tried in count():  # ends: from some try on, whatever is over its limit no longer closes in the next
+        for tried in count():  # terminates: after _TRIES, digits above their limits stop at ``now`` and no longer close
             closing = self._closing(model, now, time)
             found = solve_onward(self.driven(model), history, before, [time], halvings=_HALVINGS if closing else None)
             if not found.converged:
                 if not closing:
                     return found
-                self._stop_what_presses(model, closing, now)
+                self._stop_loaded(model, closing, now)
                 continue
-            loads = self._found(model, found)
+            loads = self._loads_at(model, found)
             over = [key for key in closing if key in loads and loads[key].share(self.pressure) > 1.0]
             if not over:
                 self._loads = loads
@@ -226,7 +227,7 @@ class ForceLimits:
         raise AssertionError
 
     def _spare_bones(self, model: ContactModel, now: float, time: float) -> None:
-        """Stop digits on whose way a bone comes too near to an object."""
+        """Stop digits in whose motion a bone comes too near to an object."""
         closing = self._closing(model, now, time)
         near = {_key_of(closing, one) for one in self.clearance.nearest(self.driven(model), time) if one.left < _SPENT}
         for key in closing:
@@ -240,18 +241,18 @@ class ForceLimits:
                     at = moment
                 self._stop(model, key, at, "hardly any flesh is left before its bone")
 
-    def _stop_what_presses(self, model: ContactModel, closing: Sequence[_Key], now: float) -> None:
-        """Stop the digits that press; all that close where none does."""
+    def _stop_loaded(self, model: ContactModel, closing: Sequence[_Key], now: float) -> None:
+        """Stop the closing digits that bear a load, or all closing ones if none does."""
         pressing = [key for key in closing if self._share(key) > 0.0]
         for key in pressing or closing:
             self._stop(model, key, now, "no equilibrium was found beyond")
             self._stuck.add(key)
 
     def _share(self, key: _Key) -> float:
-        """Load of a digit at the last equilibrium, over what it may be."""
+        """Load to limit ratio of a digit at the last equilibrium."""
         return self._loads[key].share(self.pressure) if key in self._loads else 0.0
 
-    def _found(self, model: ContactModel, found: ContactSolution) -> dict[_Key, DigitLoad]:
+    def _loads_at(self, model: ContactModel, found: ContactSolution) -> dict[_Key, DigitLoad]:
         """Loads of all digits at an equilibrium."""
         out: dict[_Key, DigitLoad] = {}
         for hand in _bendable(model):
@@ -261,21 +262,21 @@ class ForceLimits:
         return out
 
     def _angles(self, hand: FleshBody, time: float) -> NDArray[np.float64]:
-        """Joint angles [rad], shape (J, 4), of a hand some of whose digits have stopped."""
+        """Limited joint angles of a hand [rad], shape (J, 4)."""
         caps = (ramp for (actor, _), ramp in self._caps.items() if actor == hand.name)
         return held_angles(hand.bones.angles(time), caps, time)
 
     def _closing(self, model: ContactModel, now: float, time: float) -> list[_Key]:
-        """Digits of which a joint flexes on in a step."""
+        """Digits with a joint whose flexion increases in a step."""
         out = []
         for hand in _bendable(model):
-            way = (self._angles(hand, time) - self._angles(hand, now))[:, FLEXION]
+            change = (self._angles(hand, time) - self._angles(hand, now))[:, FLEXION]
             digits = closing_joints(hand.bones.skeleton).items()
-            out += [(hand.name, digit) for digit, joints in digits if (way[joints] > _SAME).any()]
+            out += [(hand.name, digit) for digit, joints in digits if (change[joints] > _SAME).any()]
         return out
 
     def _stop(self, model: ContactModel, key: _Key, time: float, why: str) -> None:
-        """Keep a digit's flexions from a time on."""
+        """Limit a digit's flexions to those at a time from there on."""
         hand = next(one for one in model.hands if one.name == key[0])
         angles = self._angles(hand, time)
         joints = closing_joints(hand.bones.skeleton)[key[1]]
@@ -284,8 +285,10 @@ class ForceLimits:
             self.stops.append(Stop(*key, model.start + time, why))
 
     def _relax(self, model: ContactModel, now: float, time: float) -> None:
-        """Let digits go on in a step whose load has fallen, by no more than squeezes flesh little; those beyond which
-        there was no equilibrium when they are free."""
+        """Raise the limits of stopped digits whose load has dropped, so far that flesh is compressed little in a step.
+
+        Digits that stopped because no equilibrium was found continue only once they bear no load.
+        """
         for key, ramp in list(self._caps.items()):
             here = {joint: (ramp.at(joint, now),) * 2 for joint in ramp.most}
             self._caps[key] = held = FlexionRamp(now, time, here)
@@ -312,6 +315,7 @@ class ForceLimits:
 
 
 def _bendable(model: ContactModel) -> list[FleshBody]:
+    """Hands driven by joint angles."""
     return [hand for hand in model.hands if hand.bones.bendable]
 
 

@@ -1,4 +1,4 @@
-"""Whether hands that touch a free object from several sides could hold it by friction, or can only push it (R122)."""
+"""Friction closure test: whether the contacts of hands on a free object can balance, or can only push it (R122)."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from warpjld.grasp.quality import Contacts, contact_wrenches
 __all__ = ["friction_closure"]
 
 _BALANCED = 1e-3
-"""Force and moment left over, over the forces that press."""
+"""Tolerance of the balance: residual wrench (moments over the object's size) relative to the sum of forces."""
 _MOST = 200
-"""Points looked at: the deepest."""
+"""Most contact points considered, the deepest first."""
 
 
 def friction_closure(
     points: NDArray[np.float64], inward: NDArray[np.float64], depth: NDArray[np.float64], friction: float
 ) -> bool:
-    """Whether pushes at points, each inside its friction cone, can balance each other.
+    """Whether contact forces inside their friction cones can balance each other.
 
-    A wedge of digits pushes out what is slippery and holds what is not: forces along the edges of the cones with
-    Σ f = 0 and Σ r × f = 0 exist, or they do not.
+    Feasibility of Σ f = 0 and Σ r × f = 0 with non-negative forces along the edges of linearised friction cones, by
+    non-negative least squares.
 
     Args:
-        points: Where skin reaches into the object [m], shape (n, 3).
+        points: Contact points, where skin penetrates the object [m], shape (n, 3).
         inward: Unit normals into the object there, shape (n, 3).
-        depth: How deep it does [m], shape (n,).
+        depth: Penetration depths [m], shape (n,).
         friction: Coulomb's μ.
     """
     from scipy.optimize import nnls
@@ -39,6 +39,6 @@ def friction_closure(
     reach = max(float(np.linalg.norm(points - centre, axis=1).max()), 1e-9)
     contacts = Contacts(points, inward, np.full(len(points), friction))
     wrenches = np.concatenate(contact_wrenches(contacts, centre, reach), axis=1)
-    some = np.ones(wrenches.shape[1])  # the forces along all edges together are one
-    left = nnls(np.vstack([wrenches, some]), np.append(np.zeros(6), 1.0))[1]
-    return bool(left < _BALANCED)
+    total = np.ones(wrenches.shape[1])  # normalisation: the forces along all edges sum to 1
+    residual = nnls(np.vstack([wrenches, total]), np.append(np.zeros(6), 1.0))[1]
+    return bool(residual < _BALANCED)

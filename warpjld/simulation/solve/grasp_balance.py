@@ -1,7 +1,7 @@
-"""How much of what presses on a grasped object may be left over: no more than it weighs, or friction hides (R112).
+"""Allowed net force on a grasped rigid object (R112).
 
-A rigid object stays where its animation has it, whatever presses on it. Where a hand alone is to hold it, a net force
-is one that nobody applies: fingers cannot press harder than thumb and palm press back.
+The motion of a rigid object is prescribed, whatever forces act on it. If only a hand holds it, a net contact force has
+no counterpart in reality: fingers cannot press harder than thumb and palm press back.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from warpjld.fem.contact import Obstacle
 __all__ = ["allowed_net", "weight_of"]
 
 _LEFT_OVER = 1.0 / 3.0
-"""Net force over what presses, up to which a grasp is taken to balance: by so much a fixed place of the object, and
-joints that do not give, falsify a grip."""
+"""Net force over the sum of contact forces up to which a grasp counts as balanced (assumed): the error caused by the
+object's fixed placement and by rigid joints."""
 _WATER, _EARTH = 1000.0, 9.81
-"""What an object may weigh where nothing is known of it [kg/m³], [m/s²]."""
+"""Assumed density of an object of unknown weight (water) [kg/m³], and gravitational acceleration [m/s²]."""
 
 
 def allowed_net(pressing: float, weight: float) -> float:
-    """Largest net force [N] of a grasp that presses with forces of this sum [N] on what may weigh so much [N]."""
+    """Largest allowed net force [N], given the sum of the contact forces [N] and the object's assumed weight [N]."""
     return max(_LEFT_OVER * pressing, weight)
 
 
 def weight_of(obstacle: Obstacle, time: float = 0.0) -> float:
-    """What an obstacle would weigh if it were of water [N]."""
+    """Weight that an obstacle would have if it were made of water [N]."""
     vertices, faces = obstacle.mesh(time)
     corners = np.asarray(vertices, dtype=np.float64)[faces]
     corners = corners - corners.reshape(-1, 3).mean(axis=0)

@@ -1,7 +1,7 @@
-"""What a contact solve belongs to: hashes of its specification, geometry, prescribed motion and version, part by part.
+"""Identity of a contact simulation: hashes of specification, geometry, prescribed motion and version, part by part.
 
-Two solves of the same identity have the same results; where two differ, the names of the parts say in what: ``PHYSICAL
-BALL: young``, ``FRICTION BALL LEFT``, ``path of LEFT``, ….
+Two simulations with the same identity have the same results; where they differ, the names of the parts tell in what:
+``PHYSICAL BALL: young``, ``FRICTION BALL LEFT``, ``path of LEFT``, ….
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from warpjld.simulation.specification import ContactSpecification
 __all__ = ["differences", "identity_of"]
 
 _DIGITS = 9
-"""Decimals of positions [m] that count: less is a matter of rounding."""
+"""Decimals to which real arrays are rounded before hashing (positions in m), so that rounding errors do not matter."""
 _SILENT = ("where", "state")
-"""Fields that decide no result."""
+"""Fields without influence on results."""
 
 
 def identity_of(model: ContactModel, contact: ContactSpecification, frames: Sequence[float]) -> dict[str, str]:
-    """Hashes by name of what they are of.
+    """Hashes by name of the part.
 
     Args:
-        model: All that may touch, at rest at its first moment.
-        contact: What was asked for.
-        frames: Those that are solved; prescribed motion is sampled at them and half-way between.
+        model: The contact model at its start.
+        contact: The specification.
+        frames: Frames to solve; prescribed motion is sampled at them and half-way between.
     """
     ends = np.array([model.start, *frames]) - model.start
     times = np.sort(np.concatenate([ends, 0.5 * (ends[:-1] + ends[1:])])).tolist()
     parts: dict[str, Any] = {"version": warpjld.__version__, "frames": [model.start, *map(float, frames)]}
-    parts |= dict(_asked(contact))
+    parts |= dict(_settings(contact))
     for pair, owner in zip(model.pairs, model.owners, strict=True):
         two = " ".join(sorted((owner.slave, owner.master)))
         parts[f"FRICTION {two}"] = pair.friction
@@ -68,8 +68,8 @@ def differences(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
     return [name for name in {**one, **other} if one.get(name) != other.get(name)]
 
 
-def _asked(contact: ContactSpecification) -> Iterator[tuple[str, Any]]:
-    """Settings by command and name."""
+def _settings(contact: ContactSpecification) -> Iterator[tuple[str, Any]]:
+    """Settings of the specification by command and field."""
     records: dict[str, Any] = {f"PHYSICAL {name}": one for name, one in contact.physical.items()}
     records |= {f"FLESH {name}": one for name, one in contact.flesh.items()}
     records |= {} if contact.pressing is None else {"PRESS": contact.pressing}
@@ -93,7 +93,7 @@ def _sampled(known: Sequence[Prescribed]) -> Iterator[NDArray[Any]]:
 
 
 def _hash(arrays: Any) -> str:
-    """SHA-256 of arrays, reals rounded."""
+    """SHA-256 of arrays; real ones are rounded."""
     out = hashlib.sha256()
     for array in arrays:
         real = np.issubdtype(array.dtype, np.floating)

@@ -1,4 +1,4 @@
-"""Touches that come and go between two frames, so that neither of them shows a force."""
+"""Contacts that begin and end between two frames, so that neither frame shows a force."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame
 __all__ = ["MissedContact", "missed_contacts"]
 
 _LEAST = 1e-6
-"""Force that counts as a touch [N]."""
+"""Force from which on digit and object count as touching [N]."""
 
 
 @dataclass(frozen=True)
 class MissedContact:
-    """One digit and what it brushes.
+    """Contact of one digit that neither of two successive frames shows.
 
     Attributes:
-        actor: Whose.
-        digit: Or the palm.
-        against: What it touches.
-        before, after: The frames between which it does, and at which it does not.
-        force: Highest force that presses [N].
+        actor: Name of the actor.
+        digit: Digit, or ``palm``.
+        against: Name of what it touches.
+        before, after: Frames between which it touches, and at which it does not.
+        force: Largest normal force [N].
     """
 
     actor: str
@@ -49,12 +49,12 @@ class MissedContact:
 def missed_contacts(
     model: ContactModel, before: SolvedFrame | None, instants: Sequence[ContactInstant]
 ) -> list[MissedContact]:
-    """What touches between two frames and at neither.
+    """Contacts between two frames that neither of them shows.
 
     Args:
-        model: Everything.
-        before: The frame before; None where nothing was solved yet.
-        instants: After it; the last of them at the frame itself.
+        model: The contact model.
+        before: The previous frame; None if there is none.
+        instants: Load steps after it; the last of them at the frame itself.
     """
     known = set() if before is None else set(_touching(model, before.nodal_contact.force))
     known |= set(_touching(model, _forces(instants[-1])))
@@ -69,12 +69,12 @@ def missed_contacts(
 
 
 def _forces(instant: ContactInstant) -> list[Array]:
-    """What presses at each pair on all nodes [N], shape (N,)."""
+    """Normal contact forces of each pair on all nodes [N], each of shape (N,)."""
     return [touch.nodal_contact.force for touch in instant.touches]
 
 
 def _touching(model: ContactModel, pressing: Iterable[Array]) -> dict[tuple[str, str, str], float]:
-    """Force [N] by actor, digit, and what it touches, of what presses at each pair on all nodes [N], shape (N,)."""
+    """Force [N] by actor, digit and what it touches, given normal forces of each pair on all nodes [N], shape (N,)."""
     out: dict[tuple[str, str, str], float] = {}
     for owner, nodal in zip(model.owners, pressing, strict=False):
         for hand in model.hands:

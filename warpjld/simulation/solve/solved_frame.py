@@ -1,4 +1,4 @@
-"""What one frame of a contact solve leaves: shapes, forces, pressures (R95)."""
+"""Results of one solved frame: displacements, forces, pressures (R95)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant
-from warpjld.fem.contact.results.nodal_contact import NodalContact, stacked, tributary_areas
+from warpjld.fem.contact.results.nodal_contact import NodalContact, stacked
 from warpjld.simulation.bodies.model import ContactModel
 
 __all__ = ["SolvedFrame", "solved_frame"]
@@ -17,16 +17,16 @@ __all__ = ["SolvedFrame", "solved_frame"]
 
 @dataclass(frozen=True, eq=False)
 class SolvedFrame:
-    """One frame.
+    """Equilibrium at one frame, of N nodes and P pairs.
 
     Attributes:
-        frame: Its number.
-        displacement: From time 0, of all nodes [m], shape (N, 3).
-        reactions: Forces that hold the prescribed nodes [N], shape (N, 3).
+        frame: Frame number.
+        displacement: Displacements of all nodes from time 0 [m], shape (N, 3).
+        reactions: Reactions at the prescribed nodes [N], shape (N, 3).
         nodal: Contact forces of each pair on all nodes, friction included [N], shape (P, N, 3).
-        nodal_contact: What presses, its area and slip, of each pair on all nodes, shape (P, N).
-        solves: Linear solves it took.
-        penetration: Deepest overlap [m].
+        nodal_contact: Normal force, contact area and slip of each pair on all nodes, shape (P, N).
+        solves: Number of linear solves.
+        penetration: Deepest penetration [m].
     """
 
     frame: float
@@ -38,18 +38,14 @@ class SolvedFrame:
     penetration: float
 
     def pressure(self, model: ContactModel) -> NDArray[np.float64]:
-        """Contact pressure at the nodes: what presses on one over the area around it [Pa], shape (N,)."""
-        mesh = model.body.mesh
-        x = mesh.nodes + self.displacement
-        area = np.zeros(len(x))
-        for one in model.bodies:
-            area += tributary_areas(mesh, one.faces, x)
+        """Contact pressure at the nodes: normal force over tributary area [Pa], shape (N,)."""
+        area = model.tributary_areas(model.body.mesh.nodes + self.displacement)
         force = self.nodal_contact.force.sum(axis=0)
-        return np.divide(force, area, out=np.zeros(len(x)), where=area > 0.0)
+        return np.divide(force, area, out=np.zeros(len(area)), where=area > 0.0)
 
 
 def solved_frame(frame: float, instants: Sequence[ContactInstant]) -> SolvedFrame:
-    """What equilibria on the way from the frame before leave, the last of them at the frame."""
+    """Results of a frame from its load steps, the last of them at the frame; slip is summed over all steps."""
     last = instants[-1]
     count = len(last.displacement)
     nodal = np.stack([t.nodal for t in last.touches]) if last.touches else np.zeros((0, count, 3))

@@ -1,4 +1,4 @@
-"""The frame from which on contact has to be solved (R91, R112)."""
+"""Search for the frame at which the contact solve has to start (R91, R112)."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from warpjld.simulation.specification import ContactSpecification, FleshMaterial
 __all__ = ["StartFrame", "find_start"]
 
 _CLEAR = 2e-4
-"""Skin deeper than this inside an object that cannot get out of the way presses on it [m]."""
+"""Penetration of skin from which an object that cannot move away counts as touched [m]."""
 
 _FAR = 2e-3
-"""Way of a free object that is worth a note [m]."""
+"""Displacement of a free object from which a note is given [m]."""
 
 _PARTED = 0.01
-"""Skin of two digits that is nearer than this at rest belongs to where they part [m]."""
+"""Distance at rest below which skin of two digits belongs to the web between them, where they always touch [m]."""
 
 _DIGIT = 0.01
-"""Skin that goes no farther than this passes no digit unseen [m]."""
+"""Largest motion of skin between two tested moments [m]: less than the thickness of a digit."""
 _MOST = 40
-"""Moments between two frames at most."""
+"""Most tested moments per frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class StartFrame:
-    """How an animation comes to the moment from which on contact has to be solved.
+    """Start of the contact solve, and what happens before it.
 
     Attributes:
-        start: That frame: the one before anything is held; the first one where something is held there already.
-        moved: Places of free objects that hands push before they hold them, by name: frames and placements.
-        began: Where these were at first [m], shape (3,), by name.
-        falls: What nothing held and fell, in words.
+        start: Frame before anything is pressed or held; the first frame if something is already.
+        moved: Free objects that hands push before they hold them, by name: frames and placements.
+        began: Initial positions of these [m], shape (3,), by name.
+        falls: Messages about objects that fell.
     """
 
     start: float
@@ -53,11 +53,11 @@ class StartFrame:
     falls: tuple[str, ...] = ()
 
     def place(self, name: str) -> Places | None:
-        """Where a free object is at the start, if not where the animation has it."""
+        """Placement of a free object at the start; None if it is the animation's."""
         return self.moved[name][1][-1] if name in self.moved else None
 
     def notes(self) -> list[str]:
-        """Where free objects were pushed before anything held them."""
+        """Messages about falls and about free objects that were pushed away."""
         out = [*self.falls]
         for name, (frames, places) in self.moved.items():
             if name not in self.began:
@@ -76,23 +76,23 @@ class StartFrame:
 def find_start(
     animation: Animation, contact: ContactSpecification, request: SolveSpecification, *, fell: bool = False
 ) -> StartFrame:
-    """Look for the first moment that needs solving (R91, R112).
+    """Find the first frame that has to be solved (R91, R112).
 
-    Before it nothing touches, or what is touched gives way: a free object that is pushed, and that friction could not
-    hold where it is, goes where nothing pushes it any more. ``fell``: free objects with weight have fallen, and weights
-    count from then on.
+    Before it nothing touches, or only free objects are pushed that friction could not hold: these are moved rigidly to
+    where nothing pushes them any more. ``fell``: free objects with weight have fallen before, so that gravity need not
+    act from the first frame on.
     """
     stands = {o for o, _ in contact.prescribed} | {grip.object for grip in contact.grips if grip.lift}
     free = [name for name in contact.physical if name not in stands]
     keyed = any(state.tracks for state in contact.prescribed.values())
-    # what stands on its points gives way to its weight by so little that it may do so in the first step
+    # a supported object deforms so little under its weight that this can be left to the first solved step
     if keyed or contact.loaded or (any(contact.gravity) and not fell and (free or not contact.grips)):
         return StartFrame(float(request.first), {})
     return _Approach(animation, contact, free).start(request)
 
 
 class _Approach:
-    """Bodies on their way to what they will hold."""
+    """Motion of hands and free objects before the first contact that has to be solved."""
 
     def __init__(self, animation: Animation, contact: ContactSpecification, free: list[str]) -> None:
         self._animation, self._contact, self._free = animation, contact, free
@@ -103,8 +103,8 @@ class _Approach:
         self._began: dict[str, NDArray[np.float64]] = {}
 
     def start(self, request: SolveSpecification) -> StartFrame:
-        """Moment after moment until something is held."""
-        # a grip is searched for from digits that touch, and may do so without pressing: that has to be solved
+        """Test moment by moment until something is pressed or held."""
+        # a grip search starts from digits in contact, which may not press yet: that frame has to be solved
         latest = min([request.last - 1.0, *(np.ceil(grip.first) - 1.0 for grip in self._contact.grips)])
         for frame in range(request.first, int(latest) + 1):
             for moment in [float(frame)] if frame == request.first else self._moments(frame):
@@ -119,7 +119,7 @@ class _Approach:
         return StartFrame(latest, self._moved, self._began)
 
     def _moments(self, frame: int) -> list[float]:
-        """Moments after the frame before and up to this one, so close that skin passes nothing from one to the next."""
+        """Times in (frame - 1, frame], so dense that skin cannot pass through anything between two of them."""
         times = [0.0, 0.5, 1.0]
         count = 1.0
         skins = [self._skins(frame - 1.0 + time) for time in times]
@@ -138,11 +138,11 @@ class _Approach:
         return [frame - 1.0 + (k + 1) / pieces for k in range(pieces)]
 
     def _skins(self, frame: float) -> dict[str, NDArray[np.float64]]:
-        """Of the actors whose flesh deforms, as the covering has them, by name [m]."""
+        """Covered skins of the actors with deformable flesh, by name [m]."""
         return {name: actor.skin(frame) for name, actor in self._actors.items()}
 
     def _pushed(self, frame: float) -> dict[str, Places] | None:
-        """Where free objects are that are pushed at a frame; None where anything is held."""
+        """Placements of free objects that are pushed at a frame; None if the frame has to be solved."""
         skins = self._skins(frame)
         flesh = self._contact.flesh
         if any(_meets_itself(actor, flesh[name], skins[name]) for name, actor in self._actors.items()):
@@ -168,14 +168,14 @@ class _Approach:
     def _free_object(
         self, name: str, frame: float, obstacles: list[Obstacle], skins: dict[str, NDArray[np.float64]]
     ) -> tuple[bool, Places | None]:
-        """Whether a free object is held at a frame, and where it is pushed to, if it is."""
+        """Whether a free object is held at a frame, and else the placement it is pushed to (None: not pushed)."""
         one = self._animation.objects[name]
         place = self._moved[name][1][-1] if name in self._moved else one.place(frame)
         vertices = place.apply(one.thing.vertices)[0]
         skin = np.concatenate([*skins.values(), np.empty((0, 3))])
         shape = Facets(vertices, one.thing.faces)
         if any(float(solid.project(vertices, 0.0).distance.min()) < _CLEAR for solid in obstacles):
-            # friction holds what lies on something: the first push is already a grip
+            # friction may hold an object that lies on something, so that any push has to be solved
             pushed = shape.project(skin).distance.min(initial=1.0) if len(skin) else 1.0
             return bool(pushed < -_CLEAR), None
         found = settle_free_object(vertices, one.thing.faces, skin, [], 0.0)
@@ -187,7 +187,7 @@ class _Approach:
         return False, Places(found.of(place.position), turn.as_quat()[None])
 
     def _pinched(self, name: str, shape: Facets, points: NDArray[np.float64]) -> bool:
-        """Whether hands that reach into a free object could hold it by friction."""
+        """Whether hands that penetrate a free object could hold it by friction."""
         if not len(points):
             return False
         found = shape.project(points)
@@ -197,8 +197,8 @@ class _Approach:
 
 
 def _meets_itself(actor: ActorAnimation, material: FleshMaterial, skin: NDArray[np.float64]) -> bool:
-    """Whether skin of two digits, or of a digit and the palm, has passed through one another where flesh would touch
-    (R126); where digits part they lie together at rest."""
+    """Whether the skins of two digits, or of a digit and the palm, intersect where flesh would touch (R126); the webs
+    between digits, which touch at rest, do not count."""
     from warpjld.covering.intersections import crossing_faces, surface_parts
 
     if not material.itself:
@@ -212,13 +212,14 @@ def _meets_itself(actor: ActorAnimation, material: FleshMaterial, skin: NDArray[
 
     def apart(pairs: NDArray[np.int32]) -> NDArray[np.bool_]:
         part = parts.of_face[pairs]
-        some = (part[:, 0] != part[:, 1]) & mine[part].all(axis=1)
-        far = np.linalg.norm(middle[pairs[some, 0]] - middle[pairs[some, 1]], axis=1) > _PARTED
-        some[some] = far
-        return np.asarray(some)
+        tested = (part[:, 0] != part[:, 1]) & mine[part].all(axis=1)
+        far = np.linalg.norm(middle[pairs[tested, 0]] - middle[pairs[tested, 1]], axis=1) > _PARTED
+        tested[tested] = far
+        return np.asarray(tested)
 
     return bool(len(crossing_faces(skin, covering.surface.faces, apart).pairs))
 
 
 def _inside(solid: Obstacle, points: NDArray[np.float64]) -> bool:
+    """Whether any point (n, 3) [m] penetrates an obstacle at its time 0."""
     return bool((solid.project(points, 0.0).distance < -_CLEAR).any())

@@ -1,7 +1,8 @@
-"""How far skin goes past other things in a step, and how many steps that asks for: nothing is to be stepped over.
+"""Sub-stepping so that no surface tunnels through another.
 
-Contact looks ahead, and behind, by about two edges of elements, and takes a point in an obstacle to have come in by the
-nearest side. A step in which skin goes farther may begin before something and end behind it, and no force says so.
+Contact search reaches about two element edges to both sides, and a point inside an obstacle is taken to have entered
+through the nearest side. A step with a larger relative motion could begin in front of a body and end behind it without
+any contact force.
 """
 
 from __future__ import annotations
@@ -17,16 +18,16 @@ from warpjld.simulation.bodies.model import ContactModel
 __all__ = ["Substeps"]
 
 _LOOKS = 4
-"""Moments of a step at which its way is looked at."""
+"""Intervals of a step at which the predicted motion is sampled."""
 _MOST = 40
-"""Steps that one is cut to at most."""
+"""Most sub-steps of a step."""
 
 
 class Substeps:
-    """Cuts steps of bodies so that nothing is stepped over.
+    """Divides steps by the relative motion of surfaces.
 
     Args:
-        model: Everything, however it is driven.
+        model: The contact model; its motion does not matter.
     """
 
     def __init__(self, model: ContactModel) -> None:
@@ -34,17 +35,17 @@ class Substeps:
         self._surfaces = {one.name: surface_of(mesh, one.faces, one.name) for one in model.bodies}
 
     def times(self, model: ContactModel, before: float, time: float, displacement: NDArray[np.float64]) -> list[float]:
-        """Rising times, the last of them ``time``, for a step that begins ``before`` at a displacement (N, 3) [m]."""
+        """Ascending times ending with ``time``, for a step that starts at ``before`` with a displacement (N, 3) [m]."""
         count = min(_MOST, max(1, int(np.ceil(self.over(model, before, time, displacement) - 1e-9))))
         return [before + (time - before) * (k + 1) / count for k in range(count - 1)] + [time]
 
     def over(self, model: ContactModel, before: float, time: float, displacement: NDArray[np.float64]) -> float:
-        """The farthest way of anything past anything, over what contact can follow in one step."""
+        """Largest relative motion of surfaces in a step, over the largest that contact search can follow."""
         times = [before + (time - before) * k / _LOOKS for k in range(_LOOKS + 1)]
         paths = {}
         for one in model.bodies:
             span = model.spans[one.name]
-            paths[one.name] = one.way(times, displacement[span], self._surfaces[one.name].nodes - span.start)
+            paths[one.name] = one.path(times, displacement[span], self._surfaces[one.name].nodes - span.start)
         worst = 0.0
         for name, path in paths.items():
             reach = self._surfaces[name].reach
@@ -62,7 +63,7 @@ class Substeps:
 
 
 def _past_itself(hand: FleshBody, path: list[NDArray[np.float64]], nodes: NDArray[np.integer]) -> float:
-    """Longest way of the skin of one digit, its nodes (n,) on a path, past that of another it may touch [m]."""
+    """Largest motion of a digit's skin relative to that of another digit it may touch [m], for skin nodes (n,)."""
     from scipy.spatial import cKDTree
 
     label = hand.hand.node_labels[nodes]
@@ -81,7 +82,7 @@ def _past_itself(hand: FleshBody, path: list[NDArray[np.float64]], nodes: NDArra
 
 
 def _past(path: list[NDArray[np.float64]], other: list[NDArray[np.float64]], reach: float) -> float:
-    """Longest way of points along one path past the nearest of another that they may touch on it [m]."""
+    """Largest motion of points along one path relative to the nearest point of another that they may touch [m]."""
     from scipy.spatial import cKDTree
 
     away, near = cKDTree(other[0]).query(path[0])
@@ -92,7 +93,7 @@ def _past(path: list[NDArray[np.float64]], other: list[NDArray[np.float64]], rea
 def _relative(
     path: list[NDArray[np.float64]], mine: NDArray[np.integer], other: list[NDArray[np.float64]], near: NDArray
 ) -> NDArray[np.float64]:
-    """How far points go past others on their paths [m], shape (n,)."""
+    """Length of the relative path between points ``mine`` and ``near`` [m], shape (n,)."""
     steps = zip(path[:-1], path[1:], other[:-1], other[1:], strict=True)
     ways = [np.linalg.norm((b - a)[mine] - (d - c)[near], axis=1) for a, b, c, d in steps]
     return np.asarray(np.sum(ways, axis=0), np.float64)

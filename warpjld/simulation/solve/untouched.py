@@ -1,4 +1,4 @@
-"""Frames of bodies that have nothing to touch: no contact is looked for."""
+"""Frames of a model without contact pairs, solved by the static solver."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def solve_untouched(
     watch: Callable[[ContactModel, SolvedFrame], str | None],
     progress: Callable[[str, int, int], None],
 ) -> tuple[SolveStatus, str]:
-    """Solve frames, one after another, onto ``done``; how it ended, and in words (see ``solve_frames``)."""
-    nothing, history = np.zeros_like(model.body.mesh.nodes), History()
-    rest = Instant(1.0, nothing, nothing, 0, 0, 0.0)
+    """Solve frames one after another and append them to ``done``; returns status and message (see ``solve_frames``)."""
+    zero, history = np.zeros_like(model.body.mesh.nodes), History()
+    rest = Instant(1.0, zero, zero, 0, 0, 0.0)
     loads = model.loads_at(0.0, history)
     after, before = Solution(SolveStatus.CONVERGED, (rest,), "", np.empty(0, np.int64), loads), 0.0
     for frame in frames:

@@ -1,1 +1,1 @@
-"""Contact interfaces: pairs, surfaces, contact points (node-to-surface and mortar), areas of contact."""
+"""Contact interfaces: pairs, surfaces, contact points (node-to-surface and mortar), contact areas."""

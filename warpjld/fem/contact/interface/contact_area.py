@@ -1,16 +1,16 @@
-"""Areas of contact, finer than the mesh: where contact, or what sticks of it, ends inside a face.
+"""Contact and stick areas with sub-element resolution: the borders inside faces, from asymptotics of the pressure.
 
-Near the border of a smooth contact pressure goes to zero as p = P √s with the distance s inside it, and outside the
-gap opens as g = (4 / 3) (P / E*) s^1.5 (Johnson 1985, §5.1: what Hertz's solution does, and any other). A node's
-pressure is an average over the faces around it, with the node's hat function as its weight: of a border that lies
-f edges beyond the node (within it, if negative) it is P √L φ(f), φ(f) = 4/15 ((f + 1)^2.5 − 2 f^2.5 + (f − 1)^2.5),
-powers of what is negative left out. That, and the gap at the open end of the edge, say where the border is:
-(1 − f)^1.5 = q φ(f), q = 3 E* g / (4 p L). Where gaps are averages too, of an end t edges outside, t^1.5 becomes
-γ(t) = 2/3 t^1.5 + 1/6 ((t + 1)^1.5 + (t − 1)^1.5): a mesh's gap is right at nodes, and straight between them.
+At the border of a smooth contact, pressure vanishes as p = P √s with the distance s inside it, and outside the gap
+opens as g = (4 / 3) (P / E*) s^1.5 (Johnson 1985, §5.1; as in Hertz's solution). A node's pressure is an average
+weighted by its hat function: with the border f edges of length L beyond the node (before it if negative) it is P √L
+φ(f), φ(f) = 4/15 ((f + 1)^2.5 − 2 f^2.5 + (f − 1)^2.5), with powers of negative numbers taken as 0. With the gap at the
+open end of the edge, the border follows from (1 − f)^1.5 = q φ(f), q = 3 E* g / (4 p L). If gaps are averages too,
+t^1.5 at an end t edges outside becomes γ(t) = 2/3 t^1.5 + 1/6 ((t + 1)^1.5 + (t − 1)^1.5): a mesh's gap is right at
+nodes, and linear between them.
 
-Inside contact, the area that friction holds ends alike: what is left of Coulomb's limit, μ p − |q|, goes to zero as √s
-(Cattaneo, Mindlin; Johnson 1985, §7.2). Slip there depends on how the loads came, so that the scale is taken from the
-next node inwards instead: of what is left at the two, the share is φ(f) / φ(f + 1).
+The border of the stick area is found alike: the reserve of friction, μ p − |q|, vanishes as √s there (Cattaneo,
+Mindlin; Johnson 1985, §7.2). As slip depends on the load history, the scale is taken from the next node inwards: the
+ratio of the two reserves is φ(f) / φ(f + 1).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from warpjld.fem.contact.interface.contact_interface import Interface
 __all__ = ["ContactArea", "beyond", "contact_modulus", "held_beyond"]
 
 _ROUNDS = 40
+"""Bisections for the position of a border."""
 
 
 def contact_modulus(body: Body, interface: Interface) -> Array:
@@ -40,12 +41,12 @@ def contact_modulus(body: Body, interface: Interface) -> Array:
 
 
 def beyond(pressure: Array, gap: Array, length: Array, modulus: Array, *, averaged: bool = False) -> Array:
-    """By how many edges the border lies beyond a pressed node, towards an open one, −1 to 1.
+    """Position f of the contact border on edges from a node in contact to an open one, in edge lengths, −1 to 1.
 
     Args:
-        pressure: At the pressed end [Pa], above 0.
-        gap: At the open end [m]; infinite where nothing is opposite.
-        length: Of the edges [m].
+        pressure: Pressure at the node in contact [Pa], above 0.
+        gap: Gap at the open node [m]; infinite if nothing is opposite.
+        length: Lengths of the edges [m].
         modulus: E* [Pa].
         averaged: Whether gaps are averages over the faces around a node, as pressures are.
     """
@@ -63,11 +64,11 @@ def beyond(pressure: Array, gap: Array, length: Array, modulus: Array, *, averag
 
 
 def held_beyond(spare: Array, inwards: Array) -> Array:
-    """By how many edges the border of what sticks lies beyond a node, −1 to 1.
+    """Position f of the stick border beyond a sticking node, in edge lengths, −1 to 1.
 
     Args:
-        spare: What is left there of Coulomb's limit [Pa], above 0.
-        inwards: The same an edge farther inside [Pa]; 0 where that is not known.
+        spare: Reserve of friction μ p − |q| at the node [Pa], above 0.
+        inwards: Reserve one edge farther inwards [Pa]; 0 if not known.
     """
     known = inwards > 0.0
     share = np.where(known, spare / np.where(known, inwards, 1.0), 0.0)
@@ -92,12 +93,12 @@ def _averaged_gap(t: Array) -> Array:
 
 
 class ContactArea:
-    """A slave surface at an instant.
+    """Evaluation of contact and stick areas on a slave surface.
 
     Args:
-        interface: The pair.
-        near: Slave nodes with something before them, as indices into the surface's, shape (n,).
-        area: What of their surroundings has something opposite [m²], shape (n,).
+        interface: The interface.
+        near: Slave nodes within the search distance, as indices into the surface's nodes, shape (n,).
+        area: Parts of their tributary areas that face the other side [m²], shape (n,).
         x: Positions of the body's nodes [m], shape (N, 3).
     """
 
@@ -110,14 +111,16 @@ class ContactArea:
         self._covered[near] = np.minimum(area / np.maximum(whole[near], 1e-300), 1.0)
 
     def areas(self, pressure: Array, gap: Array, modulus: Array, spare: Array) -> tuple[Array, Array]:
-        """Area under pressure around nodes, and the part of it that friction holds [m²], shape (n,) each: each face's
-        share inside the border goes to its pressed corners, as far as their surroundings have something opposite.
+        """Contact area and stick area at nodes [m²], shape (n,) each.
+
+        The part of each face inside the border is divided among its corners in contact, in proportion to the share of
+        their tributary areas that faces the other side.
 
         Args:
             pressure: [Pa], shape (n,).
-            gap: At the nodes, or averaged around them where the interface averages [m], shape (n,).
-            modulus: E* of all slave nodes [Pa], shape (m,).
-            spare: What is left of Coulomb's limit where nodes stick [Pa], shape (n,); 0 where they slide.
+            gap: Gaps at the nodes, averaged if the interface averages [m], shape (n,).
+            modulus: E* at all slave nodes [Pa], shape (m,).
+            spare: Reserve of friction at sticking nodes [Pa], shape (n,); 0 where they slide.
         """
         near, count = self._near, self._count
         load, distance, left = np.zeros(count), np.full(count, np.inf), np.zeros(count)
@@ -126,8 +129,8 @@ class ContactArea:
         corners = self._interface.slave.corners
         around = np.zeros(count, dtype=bool)
         around[corners[pressed[corners].any(axis=1)]] = True
-        some = np.flatnonzero(around[corners].any(axis=1))
-        faces = _Faces(corners[some], self._x[self._interface.slave.quads[some]], count)
+        near_contact = np.flatnonzero(around[corners].any(axis=1))
+        faces = _Faces(corners[near_contact], self._x[self._interface.slave.quads[near_contact]], count)
         i, j, length = faces.across(pressed)
         f = beyond(load[i], distance[j], length, modulus[i], averaged=self._interface.averages)
         depth = faces.depth(pressed, i, j, f)
@@ -136,13 +139,14 @@ class ContactArea:
         if not stuck.any():
             return whole, np.zeros(len(near))
         i, j, _ = faces.across(stuck)
-        still = pressed[j]  # where pressure ends, what sticks ends with it
-        i, j = i[still], j[still]
+        inner = pressed[j]  # elsewhere the stick area ends at the border of contact
+        i, j = i[inner], j[inner]
         held = faces.depth(stuck, i, j, held_beyond(left[i], faces.inwards(left, stuck, i, j)))
         held = np.where(pressed, np.minimum(depth, held), depth)
         return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
 
     def _at_nodes(self, faces: _Faces, depth: Array, pressed: Mask) -> Array:
+        """Area with positive ``depth`` (m,), divided among nodes [m²], shape (n,)."""
         corners = faces.corners
         area = _positive_area(faces.at, depth[corners])
         mask = (pressed | (depth > 0.0))[corners]
@@ -151,7 +155,7 @@ class ContactArea:
 
 
 class _Faces:
-    """Faces whose corners are nodes (F, 4) of m in all, at positions (F, 4, 3), and their edges, both ways."""
+    """Faces with corners (F, 4) among ``count`` nodes, at positions (F, 4, 3), and their directed edges."""
 
     def __init__(self, corners: Ints32, at: Array, count: int) -> None:
         self.corners, self.at, self._count = corners, at, count
@@ -161,13 +165,13 @@ class _Faces:
         self._way = np.concatenate([way, -way])
 
     def across(self, inside: Mask) -> tuple[Ints32, Ints32, Array]:
-        """Edges that leave a set of nodes: where from, where to, and their lengths [m]."""
+        """Edges that leave a set of nodes: start nodes, end nodes, and lengths [m]."""
         chosen = inside[self._start] & ~inside[self._end]
         length = np.linalg.norm(self._way[chosen], axis=1)
         return self._start[chosen], self._end[chosen], np.maximum(length, 1e-300)
 
     def inwards(self, values: Array, inside: Mask, i: Ints32, j: Ints32) -> Array:
-        """Values at the inner nodes that best go on backwards from edges j → i; 0 where none lies that way."""
+        """Values at the inner neighbours of i that continue edges j → i most straightly; 0 if there are none."""
         place = np.zeros((self._count, 3))
         place[self.corners.ravel()] = self.at.reshape(-1, 3)
         kept = inside[self._start] & inside[self._end]
@@ -177,22 +181,26 @@ class _Faces:
         first, last = np.searchsorted(start, i), np.searchsorted(start, i, side="right")
         out, best = np.zeros(len(i)), np.full(len(i), 0.5)
         for k in range(int((last - first).max(initial=0))):
-            some = np.flatnonzero(first + k < last)
-            inner = end[first[some] + k]
-            back, on = place[i[some]] - place[inner], place[j[some]] - place[i[some]]
+            rows = np.flatnonzero(first + k < last)
+            inner = end[first[rows] + k]
+            back, on = place[i[rows]] - place[inner], place[j[rows]] - place[i[rows]]
             size = np.linalg.norm(back, axis=1) * np.linalg.norm(on, axis=1)
             straight = np.einsum("ni,ni->n", back, on) / np.maximum(size, 1e-300)
-            better = straight > best[some]
-            best[some[better]], out[some[better]] = straight[better], values[inner[better]]
+            better = straight > best[rows]
+            best[rows[better]], out[rows[better]] = straight[better], values[inner[better]]
         return out
 
     def depth(self, inside: Mask, i: Ints32, j: Ints32, f: Array) -> Array:
-        """How many edges nodes lie inside a border that edges i → j cross f edges beyond i, negative outside, (m,)."""
+        """Signed distance of nodes from a border in edge lengths, positive inside, shape (m,).
+
+        The border crosses edges i → j at f edge lengths beyond i; values at nodes are means over their edges, limited
+        to differ by 1 from node to node.
+        """
         count, start, end = self._count, self._start, self._end
         out = np.where(inside, 1.0, -1.0)
         alone = np.ones(count, dtype=bool)
         alone[start[inside[start] & inside[end]]] = False
-        f = np.where(alone[i], np.maximum(f, 0.0), f)  # something presses there
+        f = np.where(alone[i], np.maximum(f, 0.0), f)  # an isolated node in contact is inside the border
         for nodes, values in ((i, f), (j, f - 1.0)):
             total, number = np.bincount(nodes, values, count), np.bincount(nodes, minlength=count)
             out = np.where(number > 0, total / np.maximum(number, 1), out)
@@ -209,17 +217,17 @@ class _Faces:
 
 
 def _positive_area(at: Array, values: Array) -> Array:
-    """Area of the part of quadrilaterals (F, 4, 3) where what their corners say (F, 4) is positive, shape (F,)."""
+    """Area of the part of quadrilaterals (F, 4, 3) in which interpolated corner values (F, 4) are positive, (F,)."""
     polygon = np.zeros((len(at), 8, 3))
     used = np.zeros((len(at), 8), dtype=bool)
     for k in range(4):
         here, there = values[:, k], values[:, (k + 1) % 4]
         used[:, 2 * k] = here > 0.0
         used[:, 2 * k + 1] = (here > 0.0) != (there > 0.0)
-        way = here / np.where(used[:, 2 * k + 1], here - there, 1.0)
+        share = here / np.where(used[:, 2 * k + 1], here - there, 1.0)
         polygon[:, 2 * k] = at[:, k]
-        polygon[:, 2 * k + 1] = at[:, k] + way[:, None] * (at[:, (k + 1) % 4] - at[:, k])
-    for k in range(16):  # what is not part of the polygon lies on the part before it
+        polygon[:, 2 * k + 1] = at[:, k] + share[:, None] * (at[:, (k + 1) % 4] - at[:, k])
+    for k in range(16):  # unused corners coincide with the corner before them
         polygon[:, k % 8] = np.where(used[:, k % 8, None], polygon[:, k % 8], polygon[:, (k - 1) % 8])
     from_first = polygon - polygon[:, :1]
     vector = 0.5 * np.cross(from_first, np.roll(from_first, -1, axis=1)).sum(axis=1)

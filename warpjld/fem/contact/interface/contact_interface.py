@@ -1,4 +1,4 @@
-"""Where two surfaces, or one and an obstacle, may touch: mortar or node-to-surface contact points found afresh."""
+"""Contact interface: search for contact points of a pair, by mortar integration or closest-point projection."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 __all__ = ["Interface", "interfaces_of"]
 
 _NEAR, _FAR = 0.5 * (1.0 + 1.0 / np.sqrt(3.0)), 0.5 * (1.0 - 1.0 / np.sqrt(3.0))
+"""Linear shape functions of an edge at its two Gauss points."""
 _GAUSS = np.array(
     [
         [_NEAR * _NEAR, _NEAR * _FAR, _FAR * _FAR, _NEAR * _FAR],
@@ -28,22 +29,23 @@ _GAUSS = np.array(
         [_NEAR * _FAR, _FAR * _FAR, _NEAR * _FAR, _NEAR * _NEAR],
     ]
 )
-"""Weights of a face's corners at its four integration points."""
+"""Bilinear shape functions of a face's corners at its 2 × 2 Gauss points."""
 
 
 class Interface:
-    """A pair, ready to be asked for its points at any configuration.
+    """Discretised contact pair that finds its contact points at any configuration.
 
-    Between surfaces that both deform, a site is a slave node, and its point averages over the node's share of the
-    surface (mortar method, Puso & Laursen 2004). Against an obstacle, sites are the slave nodes themselves, or the
-    2 × 2 Gauss points of each slave face: an edge of the obstacle that passes between nodes is then met all the same.
+    Between two deformable surfaces, sites are slave nodes, and their points are weighted averages (mortar method, Puso
+    & Laursen 2004). Against an obstacle, sites are the slave nodes, or the 2 × 2 Gauss points of each slave face, which
+    also detect edges of the obstacle between nodes.
 
     Attributes:
         pair: The pair.
         slave: Its slave surface.
-        opposite: Nodes of the master surface; none of an obstacle.
+        opposite: Nodes of the master surface; empty for an obstacle.
         edge: Edge of the slave faces at each site, at rest [m], shape (sites,).
-        share: Sites as weighted slave nodes, ``csr_array`` (sites, m), rows sum to one.
+        share: Weights of slave nodes at each site, ``csr_array`` (sites, m), rows sum to one.
+        reach: Search distance [m].
     """
 
     def __init__(self, mesh: HexMesh, pair: Pair, threads: int) -> None:
@@ -74,23 +76,21 @@ class Interface:
             self.share = csr_array((*table, rows), shape=(4 * faces, len(self.slave.nodes)))
         farthest = 0.0 if pair.offset is None else 2.0 * float(np.abs(pair.offset).max(initial=0.0))
         self.reach = self.slave.reach + farthest
-        """How far ahead a point looks [m]."""
 
     @property
     def averages(self) -> bool:
-        """Whether what points know of a slave node is an average over the faces around it."""
+        """Whether gaps at slave nodes are averages over the faces around them."""
         return self.mortar is not None or self.pair.sites == "faces"
 
     @property
     def slides(self) -> bool:
-        """Whether its points' weights and normals change as bodies move in ways whose derivatives are known: both
-        sides deform, and are not bonded."""
+        """Whether the tangent contains derivatives of its weights and normals: both sides deform and are not bonded."""
         return self.mortar is not None and self.pair.bond is None
 
     def points(self, x: Array, before: float, time: float, normals: Array | None = None) -> ContactPoints:
-        """Contact points at positions x (N, 3) and a time, for a step that began at ``before``.
+        """Contact points at positions x (N, 3) [m] and a time, for a step that began at ``before``.
 
-        ``normals`` of the slave nodes (m, 3) are taken from x unless they are given.
+        ``normals`` of the slave nodes (m, 3), for mortar interfaces, are those at x unless given.
         """
         if self.mortar is None:
             probe = self._at_nodes(x, time) if self.pair.sites == "nodes" else self._at_faces(x, time)
@@ -129,7 +129,8 @@ class Interface:
         return self.pair.master
 
     def _near(self, found: ClosestPoints, vectors: Array) -> Ints:
-        """Within reach; of what is inside, only what faces the obstacle's surface: the far side does not touch it."""
+        """Indices of points within the search distance; of penetrating ones, only those whose area vectors face the
+        obstacle's surface, since the far side of a thin body does not touch it."""
         against = np.einsum("ni,ni->n", vectors, found.normal) < 0.5 * np.linalg.norm(vectors, axis=1)
         return np.flatnonzero((found.distance < self.reach) & (against | (found.distance > 0.0)))
 
@@ -143,7 +144,7 @@ class Interface:
 
 @dataclass(frozen=True, eq=False)
 class _Probe:
-    """Sites near an obstacle: their rows of weights, areas, and what is there."""
+    """Sites near an obstacle: CSR values, columns and row pointers of their weights, areas, closest points."""
 
     sites: Ints
     values: Array
@@ -158,10 +159,10 @@ def _picked(found: ClosestPoints, rows: Ints) -> ClosestPoints:
 
 
 def interfaces_of(mesh: HexMesh, pairs: list[Pair], threads: int) -> list[Interface]:
-    """All pairs of a mesh.
+    """Interfaces of all pairs of a mesh.
 
     Raises:
-        InputError: No pair, or one that names faces the mesh lacks.
+        InputError: No pair, or one with unknown faces.
     """
     if not pairs:
         raise InputError("pairs: want at least one pair of surfaces that may touch")

@@ -14,21 +14,22 @@ __all__ = ["ContactPoints", "tangential"]
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """Where one pair may touch at one configuration; one point for each site that has something before it.
+    """Candidate contact points of one pair at one configuration; one for each site within the search distance.
 
-    The relative position of the two sides at a point is Σ_i c_i x_i, less the obstacle's own.
+    The relative position of the two sides at a point is Σ_i c_i x_i, minus the obstacle's position.
 
     Attributes:
-        sites: Which of the interface's sites each point is, ascending, shape (m,).
-        weights: c, one row a point, positive for the slave side, ``csr_array`` (m, N).
-        normal: Direction to the other side, unit, shape (m, 3).
-        area: Slave area the point stands for [m²], shape (m,).
-        gap: Distance to the other side along ``normal``, negative where they overlap [m], shape (m,).
-        carried: What the other side, if an obstacle, moved at the point since the start of the step [m], shape (m, 3).
-        facets: Slave and master facets that face each other, if the master deforms too, shape (P, 2).
-        share: Share of each two that counts, shape (P,).
-        gap_derivative: How gaps change with the displacement (3N,), beyond what they do with weights and normals that
-            stay, where that is known, ``csr_array`` (m, 3N).
+        sites: Index of each point's site, ascending, shape (m,).
+        weights: c, one row per point, positive on the slave side, ``csr_array`` (m, N).
+        normal: Unit normal towards the other side, shape (m, 3).
+        area: Tributary area on the slave [m²], shape (m,).
+        gap: Signed distance to the other side along ``normal``, negative for penetration [m], shape (m,).
+        carried: Displacement of the obstacle at the point since the start of the step [m], shape (m, 3); 0 between
+            meshes.
+        facets: Slave and master facets that face each other, between meshes, shape (P, 2).
+        share: Fraction of each facet pair that counts, shape (P,).
+        gap_derivative: Derivative of the gaps by the displacement (3N,) due to changing weights and normals,
+            ``csr_array`` (m, 3N); None if not computed.
     """
 
     sites: Ints
@@ -42,21 +43,21 @@ class ContactPoints:
     gap_derivative: Any = None
 
     def forces(self, traction: Array) -> Array:
-        """Nodal forces of tractions (m, 3) that push on the slave [N], shape (N, 3); their sum is zero."""
+        """Nodal forces of tractions (m, 3) on the slave [N], shape (N, 3); between meshes their sum is zero."""
         out: Array = self.weights.T @ (self.area[:, None] * traction)
         return out
 
     def relative(self, displacement: Array) -> Array:
-        """Σ c_i u_i of a displacement (N, 3), shape (m, 3)."""
+        """Relative displacement Σ c_i u_i of the two sides for a displacement (N, 3), shape (m, 3)."""
         out: Array = self.weights @ displacement
         return out
 
     def opened(self, displacement: Array) -> Array:
-        """By how much a displacement (N, 3) changes the gaps, to first order [m], shape (m,)."""
+        """Change of the gaps by a displacement (N, 3), to first order [m], shape (m,)."""
         out: Array = -np.einsum("mi,mi->m", self.normal, self.relative(displacement))
         return out if self.gap_derivative is None else out + self.gap_derivative @ displacement.reshape(-1)
 
 
 def tangential(vectors: Array, normals: Array) -> Array:
-    """Vectors (m, 3) less their parts along unit normals (m, 3)."""
+    """Tangential parts of vectors (m, 3) with respect to unit normals (m, 3)."""
     return np.asarray(vectors - np.einsum("mi,mi->m", vectors, normals)[:, None] * normals)

@@ -1,4 +1,4 @@
-"""What encloses a body: its whole boundary, wherever it has moved, and how deep points lie in it."""
+"""Signed distance to the whole deformed boundary of a body."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Enclosure"]
 
 
 class Enclosure:
-    """Closed surface of quadrilaterals.
+    """Closed surface of quadrilaterals with signed-distance queries.
 
     Args:
         quads: Nodes at each face's corners, anticlockwise seen from outside, shape (F, 4).
@@ -20,6 +20,7 @@ class Enclosure:
     Attributes:
         quads: As given.
         nodes: Its nodes, ascending, shape (n,).
+        low, high: Corners of its bounding box after ``move`` [m], shape (3,).
     """
 
     def __init__(self, quads: Ints32) -> None:
@@ -30,7 +31,7 @@ class Enclosure:
         self._mesh: Any = None
 
     def move(self, x: Array) -> None:
-        """Nodes lie at x (N, 3) [m] from now on."""
+        """Set the positions of all nodes, x (N, 3) [m]."""
         import warp as wp
 
         here = x[self.nodes]
@@ -42,8 +43,11 @@ class Enclosure:
         self._mesh = wp.Mesh(points=points, indices=indices, support_winding_number=True)
 
     def ask(self, points: Array, farthest: float) -> tuple[Array, Ints]:
-        """Distance of points (n, 3), negative inside [m], and the face nearest to each; (``farthest``, −1) where it is
-        farther than that. To single precision of the body's size."""
+        """Signed distances of points (n, 3), negative inside [m], shape (n,), and their nearest faces, shape (n,).
+
+        Points farther away than ``farthest`` [m] get that distance and face −1. Accuracy is single precision relative
+        to the body's size.
+        """
         import warp as wp
         from warpjld_kernels import fem_inside
 
@@ -60,7 +64,7 @@ class Enclosure:
             wp.array(closest, dtype=wp.vec3, device="cpu", copy=False),
             wp.array(triangle, dtype=wp.int32, device="cpu", copy=False),
         ]
-        reach = max(farthest / self._size, 2.0)  # what is inside is found however deep it lies
+        reach = max(farthest / self._size, 2.0)  # at least the whole size, so that inner points are found at any depth
         inputs = [self._mesh.id, reach, wp.array(local, dtype=wp.vec3, device="cpu")]
         wp.launch(fem_inside.signed_distance, dim=len(near), inputs=[*inputs, *outputs], device="cpu")
         distance[near] = found * self._size

@@ -19,54 +19,55 @@ from warpjld.fem.launch import on_rows, shared
 __all__ = ["Mortar"]
 
 _FACING = -0.2
-"""Facets may touch where the cosine of the angle between their normals is below this."""
+"""Cosine of the angle between facet normals below which facets may be in contact."""
 _TURN = 0.4
-"""They do so fully where it is less than that by this."""
+"""Width of the transition below that cosine to full contact."""
 _LEAST, _SLIVER, _OFF = 0.05, 0.1, 0.25
-"""Share of a node's surface below which a point is none, and below which its average hangs on a sliver. Between the two
-it fades out: it seems farther off than it is, by up to so many edges, and what is seen there lies no farther outside
-than the nodes. A pressure that opens a gap acts on hardly any area there, so that it would have no bound; and the
-average may overlap the more the farther the sides are parted, so that there would be no solution. What presses beside
-it is to hold it."""
+"""Share of a node's tributary area facing the other side, below which it is no contact point, and below which its gap
+is an average over a sliver. Between the two the point fades out: its gap is enlarged by up to the third number times
+the edge, and the surface offset is faded. The reason: pressure on a sliver has hardly any area, and so no bound, and
+the average over it may decrease while the sides separate, so that there would be no solution. Points beside it carry
+the load instead."""
 
 
 _AHEAD = 0.25
-"""Way of a node, over the reach, after which pairs of facets are looked for again."""
+"""Displacement of a node, over the search distance, after which facet pairs are searched again."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Near:
-    """Pairs of facets (P, 2) that may come within ``reach`` as long as no node is far from where it was, x (N, 3)."""
+    """Candidate facet pairs (P, 2) found at positions x (N, 3) for a search distance ``reach``."""
 
     x: Array
     reach: float
     pairs: Ints32
 
     def serves(self, x: Array, *surfaces: ContactSurface) -> bool:
-        way = max(float(np.abs(x[one.nodes] - self.x[one.nodes]).max()) for one in surfaces)
-        return way < 0.99 * _AHEAD * self.reach
+        """Whether the list is complete at positions x (N, 3): no node of the surfaces has moved too far."""
+        moved = max(float(np.abs(x[one.nodes] - self.x[one.nodes]).max()) for one in surfaces)
+        return moved < 0.99 * _AHEAD * self.reach
 
 
 def _boxes(x: Array, surface: ContactSurface) -> tuple[Array, Array]:
-    """Lowest and highest coordinates of each facet [m], shape (F, 3) each."""
+    """Bounding boxes of facets: lowest and highest coordinates [m], shape (F, 3) each."""
     corners = x[surface.quads]
     return corners.min(axis=1), corners.max(axis=1)
 
 
 class Mortar:
-    """Two surfaces of a body, and the integrals over what they have in common.
+    """Mortar discretisation of two surfaces: integrals over the overlaps of their facets.
 
     Args:
-        slave: Where pressures live.
-        master: The other side; may be the same.
-        pair: Exclusions.
-        count: Nodes of the body, N.
-        threads: Threads.
+        slave: Slave (non-mortar) surface, which carries the multipliers.
+        master: Master (mortar) surface; may be the same.
+        pair: Exclusions and offset.
+        count: Number of nodes of the body, N.
+        threads: Number of threads.
 
     Attributes:
         slave, master, threads: As given.
-        offset: How far what is seen lies outside the nodes [m], shape (N,), where it does.
-        labels: Of the slave's and the master's facets, shapes (F,) and (G,).
+        offset: Height of the visible surface above the nodes [m], shape (N,); None without.
+        labels: Labels of the slave's and the master's facets, shapes (F,) and (G,).
         joined, fringe: See ``Exclusion``.
     """
 
@@ -94,7 +95,7 @@ class Mortar:
         same = slave.quads.shape == master.quads.shape and bool((slave.quads == master.quads).all())
         if same:
             if exclusion is None:
-                raise InputError(f"{pair.title}: a surface against itself wants an exclusion, to know its parts")
+                raise InputError(f"{pair.title}: self-contact needs an exclusion that labels the parts of the surface")
             never |= np.tril(np.ones_like(never))
         self.labels = np.ascontiguousarray(mine), np.ascontiguousarray(other)
         self.joined = joined
@@ -104,16 +105,16 @@ class Mortar:
         self._last: tuple[Array, float, Ints32, Array] | None = None
 
     def points(self, x: Array, reach: float, normals: Array) -> ContactPoints:
-        """Points at positions x (N, 3) with slave normals (m, 3).
+        """Contact points at positions x (N, 3) [m] with slave normals (m, 3).
 
-        Of facets face to face, no farther apart than ``reach``, nor deeper.
+        Only facets that face each other with a distance or depth of at most ``reach`` [m] count.
         """
         slave, master = self.slave, self.master
         pairs, found = self._facing(x, reach)
         share = counted_share(self, pairs, found, normals, x, reach)
-        some = share > 0.0
-        pairs, share = pairs[some], share[some]
-        found = share[:, None] * found[some]
+        counted = share > 0.0
+        pairs, share = pairs[counted], share[counted]
+        found = share[:, None] * found[counted]
         corner = slave.corners[pairs[:, 0]]
         rows = np.repeat(corner, 4, axis=1)
         own = np.tile(slave.quads[pairs[:, 0]], 4)
@@ -134,34 +135,34 @@ class Mortar:
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
 
     def met_by(self, label: int) -> Mask:
-        """Master facets that slave facets of a label may meet, shape (G,)."""
+        """Mask of the master facets that slave facets of a label may touch, shape (G,)."""
         return np.asarray(self._never[label, self.labels[1]] == 0)
 
     def sliver_offset(self, sites: Ints, area: Array) -> tuple[Array, Array]:
-        """What slivers seem farther off [m], and its derivative by their area [1/m], shape (m,) each."""
+        """Enlargement of the gaps of slivers [m], and its derivative by their area [1/m], shape (m,) each."""
         t, per_area = self.sliver_share(sites, area)
         edge = self.slave.edge[sites]
         return _OFF * edge * (1.0 - t) ** 2, -2.0 * _OFF * edge * (1.0 - t) * per_area
 
     def sliver_share(self, sites: Ints, area: Array) -> tuple[Array, Array]:
-        """How far points are from being none, 0 to 1, and its derivative by their area [1/m²], shape (m,) each."""
+        """Fading factor of points with little area, 0 to 1, and its derivative by area [1/m²], shape (m,) each."""
         whole = (_SLIVER - _LEAST) * self.slave.edge[sites] ** 2
         t = (area - _LEAST * self.slave.edge[sites] ** 2) / whole
         return np.clip(t, 0.0, 1.0), np.where((t > 0.0) & (t < 1.0), 1.0 / whole, 0.0)
 
     def _facing(self, x: Array, reach: float) -> tuple[Ints32, Array]:
-        """Pairs of facets face to face, and their integrals; the last place that was asked for is remembered."""
+        """Facet pairs that face each other, and their integrals; the last result is cached."""
         if self._last is None or self._last[1] != reach or not np.array_equal(self._last[0], x):
             pairs = self._neighbours(x, reach)
             found = self.integrals(pairs, self.slave.quads, self.master.quads, x, reach)
-            some = found[:, 32] > 0.0
-            self._last = x.copy(), reach, pairs[some], found[some]
+            overlapping = found[:, 32] > 0.0
+            self._last = x.copy(), reach, pairs[overlapping], found[overlapping]
         return self._last[2], self._last[3]
 
     def _neighbours(self, x: Array, reach: float) -> Ints32:
-        """Slave and master facets, shape (P, 2), in order: all whose boxes are within ``reach``, and some more.
+        """Candidate facet pairs, shape (P, 2), sorted: a superset of those whose boxes are within ``reach`` [m].
 
-        They are looked for again only when a node has moved so far that others may have come.
+        Searched again only when a node has moved so far that the list may be incomplete.
         """
         near = self._near
         if near is None or near.reach != reach or not near.serves(x, self.slave, self.master):
@@ -169,7 +170,7 @@ class Mortar:
         return near.pairs
 
     def _within(self, x: Array, reach: float) -> Ints32:
-        """Slave and master facets whose boxes are within ``reach``, shape (P, 2), by slave and by master."""
+        """Slave and master facets whose bounding boxes are within ``reach`` [m], shape (P, 2), sorted by both."""
         import warp as wp
         from warpjld_kernels import contact_facets
 
@@ -194,7 +195,8 @@ class Mortar:
         return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
     def integrals(self, pairs: Ints32, slave: Ints32, master: Ints32, x: Array, reach: float) -> Array:
-        """Of pairs (P, 2) of quadrilaterals with corners at x (n, 3), see the kernel, shape (P, 33)."""
+        """Mortar integrals of pairs (P, 2) of quadrilaterals with corners at x (n, 3), shape (P, 33), see the
+        kernel."""
         from warpjld_kernels import contact_mortar
 
         out = np.zeros((len(pairs), 33))
@@ -205,9 +207,9 @@ class Mortar:
         return out
 
     def derivatives(self, pairs: Ints32, x: Array, reach: float) -> Array:
-        """Of the integrals of pairs (P, 2), by the coordinates of their corners, the slave's first, shape (P, 24, 33).
+        """Derivatives of the integrals of pairs (P, 2) by their corners' coordinates, slave's first, (P, 24, 33).
 
-        Each pair's own: corners that pairs share are moved one pair at a time.
+        Per pair: corners shared by several pairs contribute to each pair separately.
         """
         from warpjld_kernels import contact_mortar
 

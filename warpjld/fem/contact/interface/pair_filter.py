@@ -1,10 +1,10 @@
-"""Filter of facet pairs: false overlaps, of facets that face each other through a thin body.
+"""Filter of facet pairs that face each other through a thin body and falsely appear to penetrate.
 
-Of two fingers side by side the back of one faces the palmar side of the other, as surfaces do that overlap, only a
-whole finger deep. Where their sides touch, slivers of such facets lie one before the other, and one finger would be
-pushed out through the other. In the bottom of a crease normals of nodes are far from those of the facets around, and
-what is opposite a facet seems to be behind its node. The far side of a fingertip no larger than a few facets faces
-what the near side touches. What really overlaps so deep is that deep inside.
+With two fingers side by side, the back of one faces the palmar side of the other like penetrating surfaces, a whole
+finger deep; where their sides touch, slivers of such facets overlap in projection, and one finger would be pushed out
+through the other. At the bottom of a crease, nodal normals differ much from those of the facets around, and an opposite
+facet appears to lie behind the node. The far side of a fingertip of few facets faces what the near side touches. The
+test: facets with a real penetration of some depth lie that deep inside the other body.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ if TYPE_CHECKING:
 __all__ = ["counted_share"]
 
 _TIMES, _SLACK = 3.0, 0.5
-"""Overlap along the normal that counts for nothing: over how deep facets are inside each other, and that of facets that
-only touch, in edges. Half of it counts fully."""
+"""A pair is discarded if its penetration along the normal exceeds the first number times its real depth plus the second
+number of edges; it counts fully below half of that."""
 _OWN_SLACK = 1.0
-"""The latter for parts that belong together, whose depth in each other is not known: they are inside one another where
-they are joined."""
+"""The second number for parts that belong together (``Exclusion.joined``), whose real depth is not known because they
+overlap where they are joined."""
 
 
 def counted_share(mortar: Mortar, pairs: Ints32, integrals: Array, normals: Array, x: Array, reach: float) -> Array:
-    """Share of pairs (P, 2) of facets that counts, 0 where they only seem to overlap, shape (P,).
+    """Fraction with which facet pairs (P, 2) count, 0 for false penetrations, shape (P,).
 
     Args:
         mortar: The two surfaces.
-        pairs: Facets face to face.
-        integrals: Of each, as the mortar kernel has them, shape (P, 33).
-        normals: At the slave's nodes, shape (m, 3).
+        pairs: Facets that face each other.
+        integrals: Their mortar integrals (see the kernel), shape (P, 33).
+        normals: Normals at the slave's nodes, shape (m, 3).
         x: Positions of the body's nodes [m], shape (N, 3).
-        reach: Farthest that facets look at each other [m].
+        reach: Search distance [m].
     """
     slave, master = mortar.slave, mortar.master
     mine, others = mortar.labels
@@ -60,17 +60,17 @@ def counted_share(mortar: Mortar, pairs: Ints32, integrals: Array, normals: Arra
     between -= np.einsum("pk,pki->pi", own, x[slave.quads[pairs[:, 0]]])
     overlap = -np.einsum("pki,pi->pk", facing, between).min(axis=1)
     slack = np.where(joined, _OWN_SLACK, _SLACK) * slave.edge[corners].mean(axis=1)
-    some = np.flatnonzero(overlap > 0.5 * slack)
-    if not len(some):
+    deep = np.flatnonzero(overlap > 0.5 * slack)
+    if not len(deep):
         return out
-    inside = np.zeros(len(some))
+    inside = np.zeros(len(deep))
     sides: list[_Side] = [(slave, mine), (master, others)]
     for side, shares in enumerate((own, far)):
-        asked, rows = np.unique(pairs[some, side], return_inverse=True)
-        depth = _depths(asked, sides[side], sides[1 - side], mortar.joined, x, reach, mortar.threads)[rows]
-        inside = np.maximum(inside, (shares[some] * depth).sum(axis=1))
-    t = np.clip(2.0 - 2.0 * overlap[some] / (_TIMES * inside + slack[some]), 0.0, 1.0)
-    out[some] *= t * t * (3.0 - 2.0 * t)
+        facets, rows = np.unique(pairs[deep, side], return_inverse=True)
+        depth = _depths(facets, sides[side], sides[1 - side], mortar.joined, x, reach, mortar.threads)[rows]
+        inside = np.maximum(inside, (shares[deep] * depth).sum(axis=1))
+    t = np.clip(2.0 - 2.0 * overlap[deep] / (_TIMES * inside + slack[deep]), 0.0, 1.0)
+    out[deep] *= t * t * (3.0 - 2.0 * t)
     return out
 
 
@@ -79,9 +79,9 @@ _Side: TypeAlias = tuple[ContactSurface, Ints32]
 
 
 def _depths(
-    asked: Ints32, one: _Side, other: _Side, joined: NDArray[np.uint8], x: Array, reach: float, threads: int
+    facets: Ints32, one: _Side, other: _Side, joined: NDArray[np.uint8], x: Array, reach: float, threads: int
 ) -> Array:
-    """How deep the corners of facets (Q,) of one side are inside what the other belongs to [m], shape (Q, 4)."""
+    """Depth of the corners of facets (Q,) of one side inside the body of the other side [m], shape (Q, 4)."""
     import warp as wp
     from warpjld_kernels import contact_near
 
@@ -92,7 +92,7 @@ def _depths(
     bvh = wp.Bvh(*(wp.array(b, dtype=wp.vec3, device="cpu") for b in boxes))
     tables = [shared(np.ascontiguousarray(a)) for a in (mine.quads, my_labels, others.quads, labels, joined)]
     nodes = wp.array(np.ascontiguousarray(x), dtype=wp.vec3d, device="cpu", copy=False)
-    out = np.empty((len(asked), 4))
-    arguments = [bvh.id, wp.vec3d(*origin), *tables, nodes, shared(asked.astype(np.int32)), reach, shared(out)]
-    on_rows(contact_near.depths, len(asked), arguments, threads=threads, least=50)
+    out = np.empty((len(facets), 4))
+    arguments = [bvh.id, wp.vec3d(*origin), *tables, nodes, shared(facets.astype(np.int32)), reach, shared(out)]
+    on_rows(contact_near.depths, len(facets), arguments, threads=threads, least=50)
     return out

@@ -1,4 +1,4 @@
-"""Contact pairs: slave and master surfaces, friction, bonds, and what never meets."""
+"""Contact pairs: slave and master surfaces, friction, bonds and excluded facet pairs."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ __all__ = ["Bond", "Exclusion", "Pair"]
 
 @dataclass(frozen=True)
 class Bond:
-    """Two surfaces that are one until the traction between them is too much, point by point and for good (R101, R102).
+    """Tied contact that fails irreversibly, point by point, where the traction exceeds a strength (R101, R102).
 
     Attributes:
-        normal: Tension at which they part [Pa].
-        shear: Shear at which they part [Pa].
+        normal: Tensile strength [Pa].
+        shear: Shear strength [Pa].
     """
 
     normal: float = np.inf
@@ -33,16 +33,16 @@ class Bond:
 
 @dataclass(frozen=True, eq=False)
 class Exclusion:
-    """Facets that never meet: neighbouring phalanges, and what touches at rest (R127).
+    """Facet pairs excluded from contact: neighbouring phalanges, and parts that touch at rest (R127).
 
     Attributes:
         slave: Label of each slave face, shape (F,).
         master: Label of each master face, shape (G,).
-        never: Pairs of labels that are left out, shape (L, L).
-        joined: Pairs of labels that belong together, shape (L, L): facets of the two overlap in a bent joint, and are
-            not parted; ``never`` if left out.
-        fringe: Share with which faces meet those that they belong together with, 0 beside what they are both next to,
-            shape (F,).
+        never: Pairs of labels without contact, shape (L, L).
+        joined: Pairs of labels that belong together, shape (L, L): their facets overlap in a bent joint, which is no
+            penetration; ``never`` if left out.
+        fringe: Weight of contact between faces of labels that belong together, 0 at their common neighbours, shape
+            (F,).
     """
 
     slave: Ints32
@@ -54,19 +54,19 @@ class Exclusion:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two surfaces that may touch.
+    """A contact pair.
 
     Attributes:
-        slave: Face set, or faces (F, 2), of the body: where pressures live. The softer or the finer side.
-        master: Face set or faces of the same (merged) body, or an obstacle. The same set again is self-contact: of two
-            labels the lower one is then the slave.
+        slave: Face set, or faces (F, 2), of the body that carries the multipliers: the softer or finer side.
+        master: Face set or faces of the same (merged) body, or an obstacle. The same set as ``slave`` is self-contact;
+            of two labels the lower one is then the slave.
         friction: Coulomb's μ.
-        name: For people, and to tell what touches by; its two sides' names if left out.
-        exclusion: Facets that never meet.
-        bond: Surfaces that are tied from the start.
-        sites: Where an obstacle is looked for: at the slave's ``nodes``; or at the integration points of its ``faces``,
-            which takes more iterations, and meets obstacles with edges or tips smaller than a face.
-        offset: How far what touches lies outside the mesh at every node of the body [m], shape (N,): a glove, or a
+        name: Name in messages and results; composed of its two sides if left out.
+        exclusion: Facet pairs without contact.
+        bond: Bond between the surfaces from the start.
+        sites: Collocation against an obstacle: at the slave's ``nodes``, or at the Gauss points of its ``faces``, which
+            takes more iterations and resolves obstacles with edges or tips smaller than a face.
+        offset: Height of the touching surface above the mesh at every node of the body [m], shape (N,): a glove, or a
             skin finer than the elements. Gaps are measured from there.
     """
 
@@ -90,12 +90,12 @@ class Pair:
 
     @property
     def title(self) -> str:
-        """What it is called in messages."""
+        """Name of the pair in messages."""
         return f"contact '{self.label}'"
 
     @property
     def label(self) -> str:
-        """Its name, or its two sides' where it has none."""
+        """Its name; composed of its two sides if it has none."""
         if self.name:
             return self.name
         sides = [side if isinstance(side, str) else type(side).__name__.lower() for side in (self.slave, self.master)]

@@ -14,7 +14,7 @@ from warpjld.geometry.rotations import unit
 __all__ = ["ContactSurface", "surface_of"]
 
 _LARGE = 1.5
-"""Edges longer than this times the middle one do not make points look farther ahead: a hand is thin."""
+"""Bound on the edge that determines the search distance, over the median edge: a hand is thin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class ContactSurface:
 
     @property
     def reach(self) -> float:
-        """How far ahead its points look [m]."""
+        """Search distance of its points [m]."""
         return 2.0 * min(float(self.edge.max()), _LARGE * float(np.median(self.edge)))
 
     def area_vectors(self, x: Array) -> Array:
@@ -45,7 +45,7 @@ class ContactSurface:
         return out
 
     def at_nodes(self, faces: Array) -> Array:
-        """Face values shared equally by the corners, shape (m, …)."""
+        """Face values distributed equally to the corners, shape (m, …)."""
         flat = np.repeat(faces.reshape(len(faces), -1) / 4.0, 4, axis=0)
         where = self.corners.ravel()
         columns = [np.bincount(where, weights=column, minlength=len(self.nodes)) for column in flat.T]
@@ -53,7 +53,7 @@ class ContactSurface:
         return out
 
     def normals(self, x: Array) -> Array:
-        """Outward unit normals at the nodes, the average of the faces' by area, shape (m, 3)."""
+        """Outward unit normals at the nodes: area-weighted averages over the faces, shape (m, 3)."""
         return unit(self.at_nodes(self.area_vectors(x)))
 
 
@@ -61,7 +61,7 @@ def surface_of(mesh: HexMesh, faces: str | Ints32, what: str) -> ContactSurface:
     """Contact surface of a named face set, or of faces (element, local face), shape (F, 2).
 
     Raises:
-        InputError: No such face set, faces that the mesh lacks, or none at all.
+        InputError: Unknown face set, faces that the mesh lacks, or no faces.
     """
     if isinstance(faces, str):
         try:

@@ -1,1 +1,1 @@
-"""Contact laws: pressure, Coulomb friction, bonds."""
+"""Contact laws: pressure, Coulomb friction and bonds of one interface; its state and multiplier update."""

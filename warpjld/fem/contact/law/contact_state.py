@@ -14,31 +14,31 @@ __all__ = ["ActiveSet", "ContactState", "initial_state", "without_bonds"]
 
 
 class ActiveSet(Enum):
-    """What decides which points press, and which of them stick."""
+    """Rule that decides which points are active, and which of them stick."""
 
-    FROZEN = "the multipliers decide both, whatever the gaps (primal-dual active set)"
-    PREDICTED = "trial pressures decide who presses, the state before who sticks"
-    TRIAL = "trial tractions decide both"
+    FROZEN = "active and sticking by the multipliers, whatever the gaps (primal-dual active set)"
+    PREDICTED = "active by the trial pressures, sticking by the previous state"
+    TRIAL = "active and sticking by the trial tractions"
 
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
-    """What is known of each of an interface's s sites from one linear solve to the next.
+    """Multipliers and history variables of an interface's s sites, between linear solves.
 
     Attributes:
         pressure: Normal multiplier λ_n [Pa], ≥ 0 unless bonded, shape (s,).
         friction: Tangential multiplier λ_t, on the slave [Pa], shape (s, 3).
-        allowance: Overlap that is still allowed, where the step began inside the other body [m], shape (s,) (R112).
-        pressed_for: Iterations for which something has pressed; friction acts from the second, when the overlap of the
-            first guess is gone, shape (s,).
-        open_before: Whether the sides were apart when the step began, shape (s,).
-        slip_anchor: Slip at which friction took hold of what was apart when the step began [m], shape (s, 3): on its
-            way there it slid freely.
-        touched_at: Share of the step after which what was apart when it began comes to touch, shape (s,).
-        sticking: Whether friction holds it, or it slides if not, shape (s,).
+        allowance: Initial penetration that is still admissible [m], shape (s,) (R112).
+        pressed_for: Successive iterations with pressure; friction acts from the second on, when the overlap of the
+            initial guess is removed, shape (s,).
+        open_before: Whether the sides were apart at the start of the step, shape (s,).
+        slip_anchor: Slip at which frictional contact began, for sites that were apart at the start of the step [m],
+            shape (s, 3); up to it they slid freely.
+        touched_at: Fraction of the step after which such sites touch, shape (s,); 1 if not known.
+        sticking: Whether a site sticks; it slides otherwise, shape (s,).
         bonded: Whether the bond holds, shape (s,).
-        bond_gap: Gap at which the bond was made [m], shape (s,).
-        stiffening: Penalty over the usual one: more where a multiplier does not find its value soon, shape (s,).
+        bond_gap: Gap at which the bond was made [m], shape (s,); NaN without.
+        stiffening: Factor on the penalty, raised where multipliers converge slowly, shape (s,).
     """
 
     pressure: Array
@@ -55,7 +55,7 @@ class ContactState:
 
 
 def initial_state(count: int, pair: Pair) -> ContactState:
-    """Nothing touches yet; what is bonded is."""
+    """State of ``count`` sites without contact; bonded if the pair has a bond."""
     return ContactState(
         pressure=np.zeros(count),
         friction=np.zeros((count, 3)),
@@ -72,7 +72,7 @@ def initial_state(count: int, pair: Pair) -> ContactState:
 
 
 def without_bonds(state: ContactState, broken: Mask) -> ContactState:
-    """With bonds (s,) broken for good, and no pull across them (R102)."""
+    """The state with bonds (s,) broken for good and their tension and shear removed (R102)."""
     pressure = np.where(broken, np.maximum(state.pressure, 0.0), state.pressure)
     friction = np.where(broken[:, None], 0.0, state.friction)
     return replace(state, bonded=state.bonded & ~broken, pressure=pressure, friction=friction)

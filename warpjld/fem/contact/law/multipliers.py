@@ -1,4 +1,4 @@
-"""Update of the multipliers, λ ← the tractions a linear solve foresees, and of who sticks (Simo & Laursen 1992)."""
+"""Multiplier update: λ ← tractions predicted by a linear solve, and update of the stick state (Simo & Laursen 1992)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpjld.geometry.rotations import unit
 __all__ = ["update_multipliers"]
 
 _TORN = 3.0
-"""Friction in excess of Coulomb's, over Coulomb's, from which pressures found beside it say nothing."""
+"""Friction in excess of Coulomb's bound, over that bound, above which the pressures of the same solve are discarded."""
 
 
 def update_multipliers(
@@ -29,9 +29,18 @@ def update_multipliers(
     known: Mask,
     decides: ActiveSet,
 ) -> ContactState:
-    """State after a linear solve that foresees tractions and a slip (m, 3), and who sticks from now on (R122).
+    """State after a linear solve that predicts tractions and a slip (m, 3) (R122).
 
-    Of points that the solve did not know of (``known``, shape (m,)), nothing is kept: penalty is not pressure.
+    Args:
+        pair: Friction and bond.
+        state: State before.
+        points: Contact points.
+        tractions: Predicted tractions.
+        slip: Predicted slip [m], shape (m, 3).
+        penalty: ε [Pa/m], shape (m,).
+        known: Mask of points that were active in the solve, shape (m,); others get no multiplier, since a penalty
+            traction is no converged pressure.
+        decides: Rule for the active set.
     """
     at, count = points.sites, len(state.pressure)
     normal, friction = np.zeros(count), np.zeros((count, 3))
@@ -40,7 +49,7 @@ def update_multipliers(
     if pair.friction > 0.0 or state.bonded.any():
         across = tangential(slip - state.slip_anchor[at], points.normal)
         if decides is ActiveSet.TRIAL:
-            friction[at], sticking[at] = _as_found(pair, state, at, tractions, pressure)
+            friction[at], sticking[at] = _by_return_mapping(pair, state, at, tractions, pressure)
         else:
             pressure, friction[at], sticking[at] = _corrected(
                 pair, state, points, tractions, pressure, across, penalty, known
@@ -58,10 +67,10 @@ def update_multipliers(
     )
 
 
-def _as_found(
+def _by_return_mapping(
     pair: Pair, state: ContactState, at: Ints, tractions: ContactTractions, pressure: Array
 ) -> tuple[Array, Mask]:
-    """Friction and who sticks as the return mapping has them, friction no more than μ p of the new pressure."""
+    """Friction and stick state of the return mapping, with friction limited to μ p of the new pressure."""
     bonded = state.bonded[at]
     limit = pair.friction * np.maximum(pressure, 0.0)
     size = np.linalg.norm(tractions.friction, axis=1)
@@ -79,11 +88,11 @@ def _corrected(
     penalty: Array,
     known: Mask,
 ) -> tuple[Array, Array, Mask]:
-    """Pressure, friction and who sticks in the fixed-point phase.
+    """Pressure, friction and stick state in the fixed-point phase.
 
-    What stuck slides where its friction exceeds μ p; what slid sticks where friction would push it along its path.
-    Pressures under friction far beyond Coulomb's, of a step that slides a long way, are not kept: they would tear off
-    what in truth lies still or slides.
+    A sticking point slides if its friction exceeds μ p; a sliding point sticks if friction would act along its slip.
+    Pressures found together with friction far beyond Coulomb's bound, in a step with much sliding, are discarded: they
+    would open contacts that in fact stick or slide.
     """
     at = points.sites
     bonded = state.bonded[at]

@@ -1,7 +1,7 @@
-"""Return mapping: tractions at contact points, trial values brought back to contact's cone (R122).
+"""Return mapping: trial tractions at contact points projected onto the Coulomb cone (R122).
 
-Pressure is p = max(0, λ_n − ε g), bonds apart. Friction is the trial traction q = λ_t − ε s where it is no more than
-μ p (stick), and μ p along it where it is more (slip): Alart & Curnier 1991; Simo & Laursen 1992, Comput. Struct. 42.
+Pressure is p = max(0, λ_n − ε g), except for bonds. Friction is the trial traction q = λ_t − ε s if |q| ≤ μ p (stick),
+else μ p q / |q| (slip): Alart & Curnier 1991; Simo & Laursen 1992, Comput. Struct. 42.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from warpjld.geometry.rotations import unit
 __all__ = ["FRICTION_FROM", "ContactTractions", "overstrained", "return_mapping"]
 
 FRICTION_FROM = 2
-"""Iterations that something must have pressed for before friction acts."""
+"""Iterations with pressure after which friction acts."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTractions:
-    """Tractions and stiffness of one interface's points.
+    """Tractions and symmetric tangent of one interface's points.
 
     Attributes:
         pressure: p [Pa], shape (m,).
-        friction: Tangential traction on the slave [Pa], shape (m, 3).
-        active: Whether the point touches, shape (m,).
-        sticking: Whether friction, or a bond, holds it, shape (m,).
-        error: Overlap, or gap under pressure, that the multipliers have yet to remove [m], shape (m,).
-        blocks: Stiffness times area of each point [N/m], shape (m, 3, 3).
+        friction: Tangential traction q on the slave [Pa], shape (m, 3).
+        active: Whether the point is in contact or bonded, shape (m,).
+        sticking: Whether the point sticks or is bonded, shape (m,).
+        error: Penetration, or gap under pressure, that the multipliers still have to remove [m], shape (m,).
+        blocks: A H of each point [N/m], shape (m, 3, 3).
     """
 
     pressure: Array
@@ -58,28 +58,28 @@ def return_mapping(
     *,
     coupled: bool = False,
 ) -> ContactTractions:
-    """Tractions and their stiffness at points.
+    """Tractions at points and their symmetric tangent.
 
-    The stiffness is symmetric: that the friction of a sliding point depends on its pressure is left to the iteration,
-    or to ``friction_coupling``.
+    The dependence of friction on pressure at sliding points is not in the tangent; it is left to the iteration, or to
+    ``friction_coupling``.
 
     Args:
         pair: Friction and bond.
-        points: The points.
-        state: Multipliers.
+        points: Contact points.
+        state: Multipliers and history variables.
         slip: Relative displacement of the two sides since the start of the step [m], shape (m, 3).
         penalty: ε [Pa/m], shape (m,).
-        allowed: Share of the state's allowance that still counts, 0 to 1.
-        decides: ``FROZEN``: what pressed, by its multiplier, presses, or pulls for the moment, whatever its gap:
-            whether it lets go is then for the linear solve to say, and not for the second-order error of the move
-            before, which the penalty makes large. ``TRIAL``: tractions are then continuous, and with multipliers that
-            stay the problem is convex, so that a search along a line settles it.
-        coupled: Friction is bounded by the pressure as it is, and not by the multiplier's.
+        allowed: Fraction of the state's allowance that still counts, 0 to 1.
+        decides: Rule for the active set. ``FROZEN``: points with a positive multiplier are active whatever their gap,
+            possibly in tension for the moment; the linear solve decides whether they open, and not the second-order
+            error of the last move, which the penalty would amplify. ``TRIAL``: tractions are continuous, and with fixed
+            multipliers the problem is convex, so that a line search settles it.
+        coupled: Whether friction is bounded by the current pressure instead of the multiplier.
     """
     at, normal = points.sites, points.normal
     bonded = state.bonded[at]
-    seam = np.nan_to_num(state.bond_gap[at])
-    gap = np.where(bonded, points.gap - seam, points.gap + allowed * state.allowance[at])
+    made = np.nan_to_num(state.bond_gap[at])
+    gap = np.where(bonded, points.gap - made, points.gap + allowed * state.allowance[at])
     pressure = state.pressure[at] - penalty * gap
     active = bonded | (pressure > 0.0)
     if decides is ActiveSet.FROZEN:
@@ -92,7 +92,7 @@ def return_mapping(
     if not (pair.friction > 0.0 or bonded.any()):
         return ContactTractions(pressure, np.zeros((len(at), 3)), active, bonded.copy(), error, blocks)
     across = np.eye(3) - outer
-    # the pressure of the iterate before bounds the friction of this one: each iterate is then a convex problem
+    # Tresca friction: bounded by the previous iterate's pressure, so that each solve is a convex problem
     before = decides is not ActiveSet.PREDICTED and not coupled
     bound = np.maximum(state.pressure[at] if before else pressure, 0.0)
     grips = active & ((state.pressed_for[at] >= FRICTION_FROM) | bonded)
@@ -112,7 +112,7 @@ def _friction(
     limit: Array,
     decides: ActiveSet,
 ) -> tuple[Array, Mask, Array]:
-    """Friction [Pa] (m, 3), who sticks (m,), and the derivative by slip, less sign [Pa/m] (m, 3, 3)."""
+    """Friction [Pa] (m, 3), stick state (m,), and the negative derivative of friction by slip [Pa/m] (m, 3, 3)."""
     at = points.sites
     slip = np.einsum("mij,mj->mi", across, slip - state.slip_anchor[at])
     carried = np.einsum("mij,mj->mi", across, state.friction[at])
@@ -125,7 +125,7 @@ def _friction(
     else:
         sticking = grips & (state.sticking[at] | state.bonded[at])
         along = unit(carried)
-        # a sliding point resists what would turn its path, as much as it slides
+        # stiffness against turning of the slip direction, inversely proportional to the slip
         far = np.linalg.norm(slip, axis=1)
         turning = np.minimum(penalty, np.divide(limit, far, out=penalty.copy(), where=far > 0.0))
     friction = np.where(sticking[:, None], trial, limit[:, None] * along)
@@ -136,7 +136,7 @@ def _friction(
 
 
 def overstrained(pair: Pair, state: ContactState, points: ContactPoints, tractions: ContactTractions) -> Mask:
-    """Sites whose bond does not hold the traction across it, shape (s,) (R102)."""
+    """Mask of the sites whose bond's strength is exceeded, shape (s,) (R102)."""
     out = np.zeros(len(state.bonded), dtype=bool)
     if pair.bond is not None:
         pull = -tractions.pressure > pair.bond.normal

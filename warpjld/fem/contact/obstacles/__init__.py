@@ -1,1 +1,1 @@
-"""Obstacles: rigid and prescribed surfaces, and the closest points of them."""
+"""Obstacles: rigid or prescribed surfaces with closest-point projection."""

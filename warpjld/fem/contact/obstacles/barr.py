@@ -1,4 +1,4 @@
-"""Mathematically deformed obstacles: taper, twist and bend of a shape (R94).
+"""Globally deformed obstacles: taper, twist and bend of a shape (R94).
 
 A. H. Barr, "Global and local deformations of solid primitives", SIGGRAPH '84: the three maps, their inverses, and
 normals by the inverse transpose of their Jacobian.
@@ -24,18 +24,18 @@ Amount = Callable[[float], float] | float
 
 
 class Barr(Moving):
-    """A shape that is tapered, then twisted, then bent along one of its axes, and moved as a whole.
+    """A shape that is tapered, then twisted, then bent along one of its axes, and moved rigidly.
 
-    The amounts are those between the two ends of the shape along the axis. The next axis in the order x, y, z is where
-    a bend leads to: a rod along y bends towards z, with its middle fixed.
+    Amounts are those between the two ends of the shape along the axis. A bend is towards the next axis in the cyclic
+    order x, y, z: a rod along y bends towards z, with its middle fixed.
 
     Args:
-        shape: A solid, or vertices [m] (v, 3) and triangles (t, 3). Flat sides want enough vertices to bend.
+        shape: A rigid obstacle, or vertices [m] (v, 3) and triangles (t, 3). Flat sides need enough vertices to bend.
         axis: ``x``, ``y`` or ``z`` of the shape's frame.
-        taper: Share by which the far end is narrower than the near end, below 1; negative makes it wider.
+        taper: Fraction by which the far end is narrower than the near end, below 1; negative makes it wider.
         twist: Angle between the ends [rad].
         bend: Angle between the ends [rad].
-        motion: See `Motion`; of the deformed shape.
+        motion: Rigid motion of the deformed shape, see ``RigidMotion``.
 
     Raises:
         InputError: An unknown axis, or a shape without extent along it.
@@ -56,14 +56,14 @@ class Barr(Moving):
         vertices, faces = shape.mesh(0.0) if isinstance(shape, Rigid) else shape
         self._rest = Facets(vertices, faces)
         if isinstance(shape, Rigid):
-            # of the shape itself, each seen from within its facet, where edges are no question
+            # exact normals of the shape at each corner, evaluated slightly inside the facet to be unique at edges
             x = self._rest.vertices[self._rest.faces]
             corners = 0.999 * x + 0.001 * x.mean(axis=1, keepdims=True)
             exact = shape.project(corners.reshape(-1, 3), 0.0).normal.reshape(corners.shape)
             self._rest.move(self._rest.vertices, exact)
         self._shape = Facets(vertices, faces)
         along = "xyz".index(axis)
-        # columns u, w, v: the axis is the second, bends lead to the third
+        # columns u, w, v: the axis is the second; a bend is towards the third
         self._order = [(along + 2) % 3, along, (along + 1) % 3]
         reach = self._rest.vertices[:, along]
         self._low, self._high = float(reach.min()), float(reach.max())
@@ -78,11 +78,11 @@ class Barr(Moving):
         self._now: tuple[float, ...] | None = (0.0, 0.0, 0.0)
 
     def _project(self, points: Points, time: float) -> ClosestPoints:
-        """To the facets of the deformed shape, with Barr's normals."""
+        """Projection onto the facets of the deformed shape, with Barr's normals."""
         return self._at(time).project(points)
 
     def _carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """Back through the maps of one time, and forth through those of the other."""
+        """Inverse map of one time followed by the map of the other."""
         return self._deformed(self._undeformed(points, self._values(time_from)), self._values(time_to))
 
     def _mesh(self, time: float) -> tuple[Points, Ints32]:
@@ -109,7 +109,7 @@ class Barr(Moving):
         step = 1e-5 * self._rest.size
         inner = self._rest.vertices.copy()
         along = inner[:, self._order[1]]
-        along.clip(self._low + step, self._high - step, out=along)  # beyond its ends the shape goes on differently
+        along.clip(self._low + step, self._high - step, out=along)  # the maps are not smooth at the ends
         columns = [self._deformed(inner + h, values) - self._deformed(inner - h, values) for h in step * np.eye(3)]
         a, b, c = columns
         cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2) / step**2
@@ -146,7 +146,7 @@ class Barr(Moving):
 
 
 def _bent(w: Array, v: Array, bend: float, low: float, high: float) -> tuple[Array, Array]:
-    """Barr's bend with its centre half-way: lengths along the axis become angles."""
+    """Barr's bend about the middle of the range: lengths along the axis become angles; rigid beyond the ends."""
     middle, rate = 0.5 * (low + high), bend / (high - low)
     held = np.clip(w, low, high)
     angle = rate * (held - middle)
@@ -157,7 +157,7 @@ def _bent(w: Array, v: Array, bend: float, low: float, high: float) -> tuple[Arr
 
 
 def _straight(w: Array, v: Array, bend: float, low: float, high: float) -> tuple[Array, Array]:
-    """The inverse of `_bent`, for points nearer than the centre of the bend."""
+    """Inverse of ``_bent``, for points closer than the centre of curvature."""
     middle, rate = 0.5 * (low + high), bend / (high - low)
     away = w - middle
     angle = np.arctan2(rate * away, 1.0 - rate * v)
@@ -170,6 +170,6 @@ def _straight(w: Array, v: Array, bend: float, low: float, high: float) -> tuple
 
 
 def _arc(length: Array, angle: Array) -> tuple[Array, Array]:
-    """Where an arc of this length that turns by this angle ends: along its first direction, and across."""
+    """End point of a circular arc of given length and angle: along its initial direction, and across it."""
     half = np.sinc(angle / (2.0 * np.pi))
     return length * np.sinc(angle / np.pi), 0.5 * length * angle * half**2

@@ -1,4 +1,4 @@
-"""Closest points of a triangulated surface in double precision, with normals that are smooth across its facets."""
+"""Closest-point projection onto a triangulated surface in double precision, with smooth normals."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from warpjld.runtime.threads import in_threads, threads_for
 __all__ = ["CREASE", "Facets", "Place"]
 
 CREASE = np.radians(40.0)
-"""Edges with a larger dihedral angle are edges of the body; smaller ones come from its being made of facets."""
+"""Dihedral angle above which an edge is a sharp feature of the body, and not due to its discretisation [rad]."""
 
 _SURE = 1e-5
-"""Share of the size from which on the winding number, which is in single precision, knows inside from outside."""
+"""Distance, over the size, above which the winding number (in single precision) decides inside or outside."""
 
 _THREAD = 5_000
-"""Points a thread must have before splitting pays."""
+"""Smallest number of points per thread."""
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where on the surface points are nearest.
+    """Closest points as positions on the surface.
 
     Attributes:
         face: Triangle of each point, shape (n,).
-        weights: Barycentric coordinates there, shape (n, 3).
+        weights: Barycentric coordinates in it, shape (n, 3).
     """
 
     face: Ints32
@@ -42,16 +42,15 @@ class Place:
 
 
 class Facets:
-    """A surface whose vertices may move while its triangles stay.
+    """A triangulated surface with movable vertices.
 
-    Distances are to the facets themselves: Warp's bounding volume hierarchy names the triangle in single precision, the
-    rest is done in double precision. Normals are interpolated from the corners, where they are weighted by angle and
-    split at creases; on a crease they point from the surface to the point.
+    Distances are exact for the facets: Warp's bounding volume hierarchy finds the triangle in single precision, the
+    rest is computed in double precision. Normals are interpolated from angle-weighted corner normals, split at creases;
+    on a crease they point along the line between point and surface.
 
     Args:
         vertices: [m], shape (v, 3).
-        faces: Triangles, anticlockwise seen from outside, shape (t, 3). Where they enclose a negative volume they are
-            turned.
+        faces: Triangles, anticlockwise seen from outside, shape (t, 3); reversed if they enclose a negative volume.
 
     Raises:
         InputError: Not finite, wrong shapes, indices out of range, or only triangles without area.
@@ -72,8 +71,8 @@ class Facets:
         self.move(points)
 
     def move(self, vertices: Array, normals: Array | None = None) -> None:
-        """Put the vertices elsewhere [m], shape (v, 3); with normals of the triangles' corners, of any length, shape
-        (t, 3, 3), where they are known better than from the facets."""
+        """Set the vertices [m], shape (v, 3), and optionally exact normals of the triangles' corners, of any length,
+        shape (t, 3, 3)."""
         import warp as wp
 
         self.vertices = vertices
@@ -81,7 +80,7 @@ class Facets:
         self._origin = vertices.mean(axis=0)
         self._features(normals)
         local = wp.array(self._local(vertices), dtype=wp.vec3, device="cpu")
-        # a new tree: refitting an old one after large deformation makes slow queries
+        # a new hierarchy: one refitted after large deformation makes queries slow
         self._mesh = wp.Mesh(
             points=local,
             indices=wp.array(self.faces.ravel(), dtype=wp.int32, device="cpu"),
@@ -89,11 +88,11 @@ class Facets:
         )
 
     def project(self, points: Points) -> ClosestPoints:
-        """Distances, nearest points and normals of points (n, 3) [m]."""
+        """Signed distances, closest points and normals of points (n, 3) [m]."""
         return self.locate(points)[0]
 
     def locate(self, points: Points) -> tuple[ClosestPoints, Place]:
-        """As `project`, and which triangles the nearest points lie in."""
+        """As ``project``, with the triangles and barycentric coordinates of the closest points."""
         face, inside = self._nearest(points)
         weights = _closest_weights(self.vertices[self.faces[face]], points)
         place = Place(face, weights)
@@ -101,8 +100,8 @@ class Facets:
         away = points - closest
         reach = np.linalg.norm(away, axis=1)
         normal, feature = self._normals(place)
-        # near the surface the side of the facet, edge or corner decides; elsewhere the winding number, which also sees
-        # other parts of the same surface
+        # near the surface the pseudonormal of the facet, edge or corner decides; elsewhere the winding number, which
+        # also accounts for other parts of the same surface
         beyond = np.einsum("ni,ni->n", away, feature) >= 0.0
         outside = np.where(reach < _SURE * self.size, beyond, ~inside)
         distance = np.where(outside, reach, -reach)
@@ -111,13 +110,20 @@ class Facets:
         return ClosestPoints(distance, closest, normal), place
 
     def at(self, place: Place, vertices: Array) -> Points:
-        """Places of the surface when its vertices lie there [m], shape (n, 3)."""
+        """Positions of places for given vertices [m], shape (n, 3)."""
         out: Points = np.einsum("nk,nki->ni", place.weights, vertices[self.faces[place.face]])
         return out
 
+    def carried(self, points: Points, vertices: Array) -> Points:
+        """Points (n, 3) [m] carried along when the surface's vertices move to ``vertices``; the offset of a point from
+        its nearest facet rotates with it."""
+        found, place = self.locate(points)
+        offset = np.einsum("nij,nj->ni", self.frames(place, self.vertices), points - found.closest)
+        return np.asarray(self.at(place, vertices) + np.einsum("nij,ni->nj", self.frames(place, vertices), offset))
+
     def frames(self, place: Place, vertices: Array) -> Array:
-        """Orthonormal frames of the triangles of places when the vertices lie there; rows are the first edge, the
-        normal and their cross product, shape (n, 3, 3)."""
+        """Orthonormal frames of the triangles of places for given vertices; rows are the first edge, the normal and
+        their cross product, shape (n, 3, 3)."""
         a, b, c = np.moveaxis(vertices[self.faces[place.face]], 1, 0)
         x = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
         y = np.cross(b - a, c - a)
@@ -128,7 +134,7 @@ class Facets:
         return np.ascontiguousarray((points - self._origin) / self.size, dtype=np.float32)
 
     def _nearest(self, points: Points) -> tuple[Ints32, Mask]:
-        """Nearest triangle, and inside or not, in single precision."""
+        """Nearest triangles (n,), and mask of points inside (n,), in single precision."""
         import warp as wp
         from warpjld_kernels import fem_inside
 
@@ -152,7 +158,7 @@ class Facets:
         return np.maximum(face, 0), distance < 0.0
 
     def _features(self, normals: Array | None) -> None:
-        """Normals of triangles, edges and corners, and creases."""
+        """Pseudonormals of triangles, edges and corners, corner normals, and creases."""
         x = self.vertices[self.faces]
         flat = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
         flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
@@ -166,7 +172,7 @@ class Facets:
         self._sharp_corner = sharp[self.faces]
         angles = _angles(x)
         around = _summed(self.faces.T.ravel(), angles.T[:, :, None] * flat, len(self.vertices))
-        # only their side of the surface matters, not their length
+        # pseudonormals: only their direction matters
         self._feature = np.concatenate([flat[:, None], flat[:, None] + flat[other], around[self.faces]], axis=1)
         if normals is None:
             label = _smooth_corners(self.faces, soft, self._neighbours)
@@ -175,7 +181,7 @@ class Facets:
         self.corner_normals = np.where(length > 1e-12, normals / np.maximum(length, 1e-12), flat[:, None])
 
     def _normals(self, place: Place) -> tuple[Points, Points]:
-        """Smooth normals, unit length, and those of the feature a place lies on, which tell inside from outside."""
+        """Smooth unit normals, and pseudonormals of the features that places lie on, for the sign of the distance."""
         smooth = np.einsum("nk,nki->ni", place.weights, self.corner_normals[place.face])
         length = np.linalg.norm(smooth, axis=1, keepdims=True)
         flat = self._feature[place.face, 0]
@@ -186,6 +192,7 @@ class Facets:
         return smooth, self._feature[place.face, which]
 
     def _on_crease(self, place: Place) -> Mask:
+        """Mask of places on a sharp edge or corner, shape (n,)."""
         zero = place.weights <= 0.0
         count = zero.sum(axis=1)
         edge = self._sharp_edge[place.face, zero.argmax(axis=1)]
@@ -194,7 +201,7 @@ class Facets:
 
 
 def _neighbours(faces: Ints32) -> Ints:
-    """Triangle across the edge opposite each corner, −1 where there is none or several, shape (t, 3)."""
+    """Triangle across the edge opposite each corner, −1 at boundary and non-manifold edges, shape (t, 3)."""
     edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
     _, label, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     label = label.ravel()
@@ -207,8 +214,8 @@ def _neighbours(faces: Ints32) -> Ints:
 
 
 def _smooth_corners(faces: Ints32, soft: Mask, neighbours: Ints) -> Ints:
-    """A number for each corner of each triangle, shape (t, 3): the same where triangles around a vertex are reached
-    from one another without crossing a crease."""
+    """Smoothing group of each triangle corner, shape (t, 3): the same for triangles around a vertex that are connected
+    without crossing a crease."""
     links = []
     for k in range(3):
         mine = np.flatnonzero(soft[:, k])
@@ -228,14 +235,14 @@ def _angles(x: Array) -> Array:
 
 
 def _summed(label: NDArray[np.integer], vectors: Array, count: int) -> Array:
-    """Sums of vectors with the same label, shape (count, 3)."""
+    """Sums of vectors by label, shape (count, 3)."""
     flat = vectors.reshape(-1, 3)
     return np.stack([np.bincount(label, flat[:, axis], minlength=count) for axis in range(3)], axis=1)
 
 
 def _closest_weights(triangles: Array, points: Points) -> Array:
-    """Barycentric coordinates of the closest points of triangles (n, 3, 3), exactly zero on edges and corners
-    (Ericson, Real-Time Collision Detection, §5.1.5)."""
+    """Barycentric coordinates (n, 3) of the closest points on triangles (n, 3, 3), exactly zero off edges and corners
+    that they lie on (Ericson, Real-Time Collision Detection, §5.1.5)."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     ab, ac = b - a, c - a
     d1, d2 = _dot(ab, points - a), _dot(ac, points - a)

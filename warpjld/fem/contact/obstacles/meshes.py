@@ -1,4 +1,4 @@
-"""Obstacles made of facets: rigid ones, and ones deformed by key frames (R94)."""
+"""Triangulated obstacles: rigid, or deformed by key frames (R94)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ __all__ = ["Keyframed", "RigidMesh"]
 
 
 class RigidMesh(Rigid):
-    """A triangulated surface that keeps its shape.
+    """A rigid triangulated surface.
 
     Args:
         vertices: [m], shape (v, 3).
         faces: Triangles, shape (t, 3).
-        motion: See `Motion`.
+        motion: See ``RigidMotion``.
 
     Raises:
-        InputError: See `Facets`.
+        InputError: See ``Facets``.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, motion: RigidMotion | None = None) -> None:
@@ -37,16 +37,16 @@ class RigidMesh(Rigid):
 
 
 class Keyframed(Moving):
-    """A surface whose vertices are given at times; between them they go straight, outside they stay.
+    """A surface with vertices given at times, linearly interpolated between them and constant outside.
 
     Args:
         faces: Triangles, shape (t, 3).
         times: Increasing, shape (T,).
         vertices: [m], shape (T, v, 3).
-        motion: See `Motion`; of the deformed shape.
+        motion: Rigid motion of the deformed shape, see ``RigidMotion``.
 
     Raises:
-        InputError: Times that do not increase, wrong shapes, or see `Facets`.
+        InputError: Times that do not increase, wrong shapes, or see ``Facets``.
     """
 
     def __init__(
@@ -69,13 +69,8 @@ class Keyframed(Moving):
         return self._at(time).project(points)
 
     def _carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """The offset from the nearest facet turns with it."""
-        facets = self._at(time_from)
-        found, place = facets.locate(points)
-        before, after = facets.vertices, self._shape(time_to)
-        offset = np.einsum("nij,nj->ni", facets.frames(place, before), points - found.closest)
-        turned = np.einsum("nij,ni->nj", facets.frames(place, after), offset)
-        return facets.at(place, after) + turned
+        """Material points, carried along with their nearest facets."""
+        return self._at(time_from).carried(points, self._shape(time_to))
 
     def _mesh(self, time: float) -> tuple[Points, Ints32]:
         return self._shape(time), self._facets.faces

@@ -27,18 +27,19 @@ __all__ = [
 ]
 
 RigidMotion = Callable[[float], tuple[ArrayLike, ArrayLike]]
-"""Time → position [m] and quaternion x, y, z, w: a point x of the first placement lies at rotation · x + position."""
+"""Time → position [m] and quaternion x, y, z, w: a point x of the obstacle's frame lies at rotation · x + position."""
 
 Points = Array
+"""Positions [m], shape (n, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
-    """Nearest points of an obstacle's surface.
+    """Closest-point projection of n points onto a surface.
 
     Attributes:
         distance: Signed distance [m], negative inside, shape (n,).
-        closest: Nearest points of the surface [m], shape (n, 3).
+        closest: Closest points of the surface [m], shape (n, 3).
         normal: Unit normals there, outward from the obstacle, smooth across the facets of meshes, shape (n, 3).
     """
 
@@ -48,34 +49,34 @@ class ClosestPoints:
 
 
 class Obstacle(ABC):
-    """A surface that pushes and is not pushed; its place and shape are functions of time."""
+    """A surface with prescribed motion and shape as functions of time, which contact forces do not move."""
 
     @abstractmethod
     def project(self, points: Points, time: float) -> ClosestPoints:
-        """Distances of points (n, 3) [m] at a time."""
+        """Closest-point projection of points (n, 3) [m] at a time."""
 
     @abstractmethod
     def carried(self, points: Points, time_from: float, time_to: float) -> Points:
-        """Where the obstacle's material points that lie at ``points`` (n, 3) at one time lie at another [m]; what is
-        off the surface goes along as if it were glued to it."""
+        """Positions at ``time_to`` of material points at ``points`` (n, 3) at ``time_from`` [m]; points off the surface
+        move as if attached to it."""
 
     @abstractmethod
     def mesh(self, time: float) -> tuple[Points, Ints32]:
-        """Vertices [m], shape (v, 3), and triangles, shape (t, 3), to draw it at a time."""
+        """Vertices [m], shape (v, 3), and triangles, shape (t, 3), of the surface at a time."""
 
 
 class Moving(Obstacle):
-    """An obstacle with a ``motion``, and a shape in its own frame that may be a function of time."""
+    """An obstacle with a rigid ``motion``, and a shape in its own frame that may be a function of time."""
 
     motion: RigidMotion | None
 
     @abstractmethod
     def _project(self, points: Points, time: float) -> ClosestPoints:
-        """Distances in its own frame."""
+        """Closest-point projection in its own frame."""
 
     @abstractmethod
     def _mesh(self, time: float) -> tuple[Points, Ints32]:
-        """To draw it in its own frame."""
+        """Vertices and triangles in its own frame."""
 
     def _carried(self, points: Points, time_from: float, time_to: float) -> Points:
         """Material points in its own frame."""
@@ -102,20 +103,20 @@ class Moving(Obstacle):
 
 
 class Rigid(Moving):
-    """An obstacle whose shape in its own frame is always the same."""
+    """An obstacle with constant shape in its own frame."""
 
 
 def standing(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> RigidMotion:
-    """The motion of what stands still at a position [m] with a rotation x, y, z, w."""
+    """Constant motion: at rest at a position [m] with a rotation x, y, z, w."""
     placement(lambda time: (position, rotation), 0.0)
     return lambda time: (position, rotation)
 
 
 def placement(motion: RigidMotion | None, time: float) -> tuple[Array, Array]:
-    """Rotation matrix (3, 3) and shift (3,) [m] of a motion at a time.
+    """Rotation matrix (3, 3) and translation (3,) [m] of a motion at a time.
 
     Raises:
-        InputError: The motion gives something else than a finite position and a quaternion.
+        InputError: The motion does not return a finite position and quaternion.
     """
     if motion is None:
         return np.eye(3), np.zeros(3)
@@ -131,7 +132,7 @@ def placement(motion: RigidMotion | None, time: float) -> tuple[Array, Array]:
 
 
 def checked_points(points: Any) -> Points:
-    """Points as float64; InputError where they are not finite or not of shape (n, 3)."""
+    """Points as float64; InputError if they are not finite or not of shape (n, 3)."""
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"points: want shape (n, 3), got {array.shape}")

@@ -1,4 +1,4 @@
-"""Plane, sphere, box and cylinder, by formula: exact distances and normals."""
+"""Analytic obstacles with exact distances and normals: plane, sphere, box and cylinder."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points, Rigid, RigidMotion, checked_vector
+from warpjld.geometry.box_surface import box_surface
 
 __all__ = ["Box", "Cylinder", "Plane", "Sphere"]
 
@@ -19,13 +20,13 @@ class Plane(Rigid):
     """The half-space behind a plane.
 
     Attributes:
-        point: On the plane [m].
-        normal: Out of the obstacle, any length but zero.
-        motion: See `Motion`.
-        extent: Side of the square it is drawn as [m].
+        point: A point on the plane [m].
+        normal: Normal out of the obstacle, of any length but zero.
+        motion: See ``RigidMotion``.
+        extent: Side of the square by which it is drawn [m].
 
     Raises:
-        InputError: A normal without direction.
+        InputError: A normal of length zero.
     """
 
     point: ArrayLike = (0.0, 0.0, 0.0)
@@ -55,9 +56,9 @@ class Sphere(Rigid):
     """A ball.
 
     Attributes:
-        centre: [m].
-        radius: [m].
-        motion: See `Motion`.
+        centre: Centre [m].
+        radius: Radius [m].
+        motion: See ``RigidMotion``.
 
     Raises:
         InputError: A radius that is not above 0.
@@ -91,12 +92,12 @@ class Box(Rigid):
 
     Attributes:
         size: Extents along x, y and z [m].
-        centre: [m].
-        edge: Radius its edges and corners are rounded to [m].
-        motion: See `Motion`.
+        centre: Centre [m].
+        edge: Radius to which its edges and corners are rounded [m].
+        motion: See ``RigidMotion``.
 
     Raises:
-        InputError: A size that is not above 0, or edges rounder than the box is thick.
+        InputError: A size that is not above 0, or a radius above half the smallest extent.
     """
 
     size: ArrayLike
@@ -117,8 +118,10 @@ class Box(Rigid):
 
     def _mesh(self, time: float) -> tuple[Points, Ints32]:
         rim = self.edge * (1.0 - np.tan(np.linspace(0.0, 0.25 * np.pi, 6 if self.edge else 1)))
-        vertices, faces = _box_surface([np.concatenate([rim - h, h - rim, [-h, h]]) for h in self._half])
-        return _round_box(vertices, self._half, self.edge).closest + self._middle, faces
+        points, faces = box_surface([np.unique(np.concatenate([rim - h, h - rim, [-h, h]])) for h in self._half])
+        vertices, weld = np.unique(points, axis=0, return_inverse=True)
+        rounded = _round_box(vertices, self._half, self.edge).closest + self._middle
+        return rounded, np.asarray(weld.ravel()[faces], dtype=np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +129,15 @@ class Cylinder(Rigid):
     """A cylinder with flat ends.
 
     Attributes:
-        radius: [m].
-        length: From end to end [m].
-        centre: [m].
-        axis: Any length but zero.
-        edge: Radius its two rims are rounded to [m].
-        motion: See `Motion`.
+        radius: Radius [m].
+        length: Length from end to end [m].
+        centre: Centre [m].
+        axis: Direction of the axis, of any length but zero.
+        edge: Radius to which its two rims are rounded [m].
+        motion: See ``RigidMotion``.
 
     Raises:
-        InputError: A measure that is not above 0, an axis without direction, or rims rounder than it is thick.
+        InputError: Radius or length not above 0, an axis of length zero, or a rim radius that is too large.
     """
 
     radius: float
@@ -154,7 +157,7 @@ class Cylinder(Rigid):
         _rounding("cylinder", self.edge, min(self.radius, 0.5 * self.length))
 
     def _project(self, points: Points, time: float) -> ClosestPoints:
-        # in the half-plane of the axis and the point it is a rectangle
+        # a rectangle in the half-plane of the axis and the point
         axis = self._along
         away = points - self._middle
         along = away @ axis
@@ -171,7 +174,7 @@ class Cylinder(Rigid):
         rim = np.linspace(0.0, 0.5 * np.pi, 7 if self.edge else 1)
         r = self.radius - self.edge * (1.0 - np.sin(rim))
         h = 0.5 * self.length - self.edge * (1.0 - np.cos(rim))
-        # a ring more on the flat ends keeps the triangles there from being too slender
+        # an additional ring on the flat ends, against slender triangles
         r, h = np.concatenate([[0.5 * r[0]], r]), np.concatenate([[h[0]], h])
         steps = max(1, int(np.ceil((2.0 * h[-1]) / (2.0 * np.pi * self.radius / around))))
         side = np.linspace(h[-1], -h[-1], min(steps, 200) + 1)[1:-1]
@@ -193,7 +196,7 @@ class Cylinder(Rigid):
 
 
 def _round_box(points: Array, half: Array, edge: float) -> ClosestPoints:
-    """Distances to a box |x| ≤ half with rounded edges, in two or three dimensions: a smaller box, made fatter."""
+    """Projection onto a box |x| ≤ half with rounded edges, in two or three dimensions: a smaller box plus a radius."""
     core = half - edge
     inner = np.clip(points, -core, core)
     away = points - inner
@@ -214,28 +217,8 @@ def _round_box(points: Array, half: Array, edge: float) -> ClosestPoints:
     return ClosestPoints(distance, closest, normal)
 
 
-def _box_surface(lines: list[Array]) -> tuple[Points, Ints32]:
-    """The surface of a box, each side a grid over these coordinates; corners welded."""
-    lines = [np.unique(line) for line in lines]
-    points, faces, start = [], [], 0
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for end in (0, -1):
-            grid = np.stack(np.meshgrid(lines[u], lines[v], indexing="ij"), axis=-1)
-            side = np.full((*grid.shape[:2], 3), lines[axis][end])
-            side[..., u], side[..., v] = grid[..., 0], grid[..., 1]
-            number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape[:2]) + start
-            a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-            quads = np.stack([a, b, c, d] if end else [a, d, c, b], axis=-1).reshape(-1, 4)
-            faces += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
-            points.append(side.reshape(-1, 3))
-            start += len(points[-1])
-    kept, weld = np.unique(np.concatenate(points), axis=0, return_inverse=True)
-    return kept, np.asarray(weld.ravel()[np.concatenate(faces)], dtype=np.int32)
-
-
 def _square(axis: Array) -> tuple[Array, Array]:
-    """Two unit vectors that make a right-handed frame with a third: u × v = axis."""
+    """Two unit vectors that complete a unit axis to a right-handed frame: u × v = axis."""
     u = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     u /= np.linalg.norm(u)
     return u, np.cross(axis, u)

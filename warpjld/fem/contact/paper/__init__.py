@@ -1,1 +1,1 @@
-"""The paper's loop of repelling and releasing (B Fig. 9)."""
+"""The paper's staggered contact loop: repel, then release (B Fig. 9, R113)."""

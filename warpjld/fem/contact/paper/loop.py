@@ -1,14 +1,15 @@
 """Staggered contact of the paper: objects are repelled by the skin, then both are released (B Fig. 9, R113).
 
-1. The bones are prescribed. 2. Slave nodes that overlap are put onto the master's polygons, the master's surface is
-held. 3. K11 U_u = R_k − K12 U_k and the reactions. 4. Each reaction goes, equal and opposite, to the three nodes of the
-facet that repelled it, by barycentric weights. 5. The forces are taken as known, both bodies are released and solved
-for. Steps 2–5 are repeated until no point moves any more.
+1. The bones are prescribed. 2. Penetrating slave nodes are moved onto the master's polygons, and the master's surface
+is fixed. 3. K11 U_u = R_k − K12 U_k is solved and gives the reactions (Dirichlet step). 4. Each reaction is applied,
+equal and opposite, to the three nodes of the facet that repelled the node, by barycentric weights. 5. With these forces
+known, both bodies are released and solved for (Neumann step). Steps 2–5 are repeated until no point moves any more.
 
-It is a fixed point of the contact forces, f → F(f), whose slope is, in the main, that of the slave's stiffness over the
-master's. So it settles where the skin is the stiffer of the two, faster the stiffer it is, and elsewhere goes to and
-fro for ever. Aitken's relaxation releases bodies under f + ω (F(f) − f) instead, ω from the last two turns (Küttler &
-Wall 2008), and settles both. Turns to a thousandth of an edge, a step in time (– is never, in 60):
+It is a fixed-point iteration of the contact forces, f → F(f), whose slope is mainly the ratio of the slave's stiffness
+to the master's. So it converges if the skin is the stiffer of the two, faster the stiffer it is, and oscillates for
+ever otherwise. Aitken relaxation releases the bodies under f + ω (F(f) − f) instead, with ω from the last two
+iterations (Küttler & Wall 2008), and converges in both cases. Iterations ("turns") per time step to a thousandth of an
+edge (–: not within 60):
 
 | skin over object, modulus | 0.1 | 0.2 | 0.5 | 1 | 2 | 5 | 10 |
 |---|---|---|---|---|---|---|---|
@@ -20,9 +21,9 @@ Wall 2008), and settles both. Turns to a thousandth of an edge, a step in time (
 | the same, Aitken | 7–13 | | 6 | 5 | 4–5 | | 3–5 |
 
 A fingertip of the built-in hand on a rigid plate takes 2 to 4 turns, the hand on a ball (0.4 MPa) 14 to 29 with Aitken.
-Nodes are repelled by no more than a share of an edge at once: where bodies come to overlap by more, the step in time is
-halved, as it is where repelled or released bodies find no equilibrium. Friction is not in it (R122): while repelled,
-nodes stick. Nor are bonds, nor a surface that meets itself.
+Nodes are repelled by no more than a fraction of an edge at once: with deeper overlaps the time step is halved, as it is
+if repelled or released bodies have no equilibrium. There is no friction (R122; while repelled, nodes stick), no bonds
+and no self-contact.
 """
 
 from __future__ import annotations
@@ -47,12 +48,13 @@ from warpjld.fem.solver.solution import Instant, Solution
 __all__ = ["by_turns"]
 
 _CAUTION = 0.25
-"""First relaxation where the two sides are as stiff as one another."""
+"""First relaxation factor for two sides of equal stiffness."""
 _REPEL = 0.25
-"""Overlap, over an edge, that nodes are repelled by at once; where there is more, the step in time is halved."""
+"""Largest overlap, in element edges, by which nodes are repelled at once; with more, the time step is halved."""
 _HALVINGS = 5
+"""Most successive halvings of a time step."""
 _ADVICE = {
-    False: "it settles where the skin is the stiffer body; else relax it after Aitken, or use the default method",
+    False: "it converges if the skin is the stiffer body; else use Aitken relaxation, or the default method",
     True: "take shorter steps in time, or use the default method",
 }
 
@@ -70,7 +72,10 @@ def by_turns(
     watch: Callable[[ContactInstant], str | None] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
-    """Instants by the paper's loop; arguments as in ``press``, ``threshold`` the move, over an edge, that is none."""
+    """Instants by the paper's loop; arguments as in ``press``.
+
+    ``threshold`` is the convergence tolerance: largest motion of a point in a turn, in element edges.
+    """
     _refuse(pairs)
 
     def load(time: float) -> Loads:
@@ -83,7 +88,7 @@ def by_turns(
     last, forces = _begun(body, sides, load, after)
     reached: list[ContactInstant] = []
     steps: list[int] = []
-    tell = progress or (lambda text: None)
+    report = progress or (lambda text: None)
     begun = last.last
     status, message = SolveStatus.CONVERGED, SolveStatus.CONVERGED.value
     todo, halvings = list(times), 0
@@ -94,10 +99,10 @@ def by_turns(
         touched = [side.touching.copy() for side in sides]
         turns = Turns(body, held, sides, load(time), time, forces, omega if aitken else None, edge * threshold)
         status = turns.through(last, first, _REPEL * edge if halvings < _HALVINGS else np.inf)
-        tell(f"time {time:.3g}: {turns.report}")
+        report(f"time {time:.3g}: {turns.report}")
         if status is not SolveStatus.CONVERGED:
             halvings += 1
-            if halvings > _HALVINGS or turns.diverged:  # that, shorter steps do not change
+            if halvings > _HALVINGS or turns.diverged:  # shorter steps do not help against divergence
                 message = f"at time {time:.4g} (from {now:.4g}): {turns.report}; {_ADVICE[aitken]}"
                 break
             for side, touching in zip(sides, touched, strict=True):
@@ -122,9 +127,9 @@ def by_turns(
 def _begun(
     body: Body, sides: list[Side], loads: Callable[[float], Loads], after: ContactSolution | None
 ) -> tuple[Solution, Array]:
-    """Where the first step starts from, and the contact forces there [N], shape (N, 3)."""
-    nothing = np.zeros_like(body.mesh.nodes)
-    at, forces = Instant(1.0, nothing, nothing, 0, 0, 0.0), np.zeros_like(nothing)
+    """Solution from which the first step starts, and its contact forces [N], shape (N, 3)."""
+    zero = np.zeros_like(body.mesh.nodes)
+    at, forces = Instant(1.0, zero, zero, 0, 0, 0.0), np.zeros_like(zero)
     if after is not None:
         at = replace(at, displacement=after.last.displacement)
         forces = _missing(body, loads(after.last.time), after.last)
@@ -134,17 +139,22 @@ def _begun(
 
 
 def _refuse(pairs: Sequence[Pair]) -> None:
+    """Reject pairs with features that the paper's loop lacks.
+
+    Raises:
+        InputError: Self-contact, friction, bonds or offsets.
+    """
     for what, asked in (
-        ("does not know a surface that meets itself", any(pair.exclusion is not None for pair in pairs)),
-        ("knows neither friction nor bonds", any(pair.friction > 0.0 or pair.bond is not None for pair in pairs)),
-        ("knows no offsets", any(pair.offset is not None for pair in pairs)),
+        ("supports no self-contact", any(pair.exclusion is not None for pair in pairs)),
+        ("supports neither friction nor bonds", any(pair.friction > 0.0 or pair.bond is not None for pair in pairs)),
+        ("supports no offsets", any(pair.offset is not None for pair in pairs)),
     ):
         if asked:
             raise InputError(f"pairs: the paper's loop {what}; use method='augmented'")
 
 
 def _missing(body: Body, loads: Loads, at: ContactInstant) -> Array:
-    """Contact forces of an instant [N], shape (N, 3): what loads and reactions leave to balance."""
+    """Contact forces of an instant [N], shape (N, 3): internal forces minus loads and reactions."""
     internal = body.at(at.displacement, stiffness=False).forces.reshape(-1, 3)
     return np.asarray(
         internal - at.reactions - external_forces(body, loads, at.displacement.reshape(-1)).reshape(-1, 3)
@@ -152,7 +162,7 @@ def _missing(body: Body, loads: Loads, at: ContactInstant) -> Array:
 
 
 def _first_omega(body: Body, sides: list[Side]) -> float:
-    """A cautious relaxation to begin with: the stiffer what is repelled, the more the skin overshoots; no obstacle."""
+    """First relaxation factor: smaller the stiffer the slave, for which the master overshoots; 1 for obstacles."""
     stiffness = body.at().stiffness
     assert stiffness is not None
     stiff = np.einsum("nii->n", stiffness.diagonal())

@@ -1,4 +1,4 @@
-"""A pair in the paper's loop: which nodes overlap, where they are repelled to, and with what force (B Fig. 9, R113)."""
+"""A pair in the paper's loop: penetrating nodes, their targets on the master, and contact forces (B Fig. 9, R113)."""
 
 from __future__ import annotations
 
@@ -20,12 +20,20 @@ from warpjld.fem.contact.results.nodal_contact import to_nodes
 __all__ = ["Meeting", "Side"]
 
 _DEEPEST = 5.0
-"""Overlap, over an edge, beyond which a node is taken to have another side of the master behind it."""
+"""Overlap, in element edges, beyond which a node is taken to face the master's far side."""
 
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """Where a pair's slave nodes are repelled to."""
+    """Slave nodes of a pair to be repelled.
+
+    Attributes:
+        rows: Their indices into the slave's nodes, shape (m,).
+        target: Positions on the master [m], shape (m, 3).
+        normal: Outward normals of the master there, shape (m, 3).
+        place: Positions in the master's triangles; None for an obstacle.
+        distance: Signed distance, negative for overlap [m], shape (m,).
+    """
 
     rows: Ints
     target: Array
@@ -35,7 +43,7 @@ class Meeting:
 
 
 class Side:
-    """A pair, its surfaces, and which slave nodes are pushed."""
+    """A pair, its surfaces, and the mask ``touching`` of its active slave nodes."""
 
     def __init__(self, body: Body, pair: Pair) -> None:
         self.pair = pair
@@ -51,11 +59,12 @@ class Side:
             self.triangles = self._facets.faces
 
     def state(self) -> ContactState:
-        """Who was pushed, for a later run: nodes with a pressure."""
+        """Active nodes as a contact state, for a later run: nodes with a pressure."""
         return replace(initial_state(len(self.slave.nodes), self.pair), pressure=self.touching.astype(np.float64))
 
     def meet(self, x: Array, skin: Array, time: float) -> Meeting:
-        """Nodes that overlap or were pushed, at positions x (N, 3), and the polygons of ``skin`` (N, 3) under them."""
+        """Nodes that overlap or were active at positions x (N, 3), and their closest points on the master at positions
+        ``skin`` (N, 3)."""
         place = None
         points = x[self.slave.nodes]
         if self.obstacle is not None:
@@ -63,7 +72,7 @@ class Side:
         else:
             self._facets.move(skin[self.nodes])
             found, place = self._facets.locate(points)
-        # by the side of the nearest polygon: a master need not be closed
+        # sign by the nearest polygon's normal, since a master need not be closed
         depth = np.einsum("mi,mi->m", found.closest - points, found.normal)
         overlapping = (depth > 0.0) & (depth < _DEEPEST * self.slave.edge)
         rows = np.flatnonzero(overlapping | self.touching)
@@ -72,8 +81,8 @@ class Side:
         return Meeting(rows, found.closest[rows], found.normal[rows], place, -depth[rows])
 
     def share(self, meeting: Meeting, reactions: Array, out: Array) -> Array:
-        """Add forces on slave nodes (m, 3), and their opposites on the facets' nodes, to ``out`` (N, 3); what pulls is
-        let go. The forces that stay, shape (m, 3).
+        """Add compressive reactions of slave nodes (m, 3) [N] and the opposite forces on the facets' nodes to ``out``
+        (N, 3); nodes in tension become inactive. Returns the forces that remain, shape (m, 3).
         """
         pushes = np.einsum("mi,mi->m", reactions, meeting.normal) > 0.0
         forces = reactions * pushes[:, None]
@@ -86,7 +95,7 @@ class Side:
         return forces
 
     def touch(self, meeting: Meeting, forces: Array, x: Array) -> PairContact:
-        """What a pair says of forces on its slave nodes (m, 3) at positions x (N, 3)."""
+        """Contact of the pair from forces on its slave nodes (m, 3) [N] at positions x (N, 3) [m]."""
         surface = self.slave
         nodes = surface.nodes[meeting.rows]
         area = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))[meeting.rows]

@@ -1,4 +1,4 @@
-"""The turns of the paper's loop at one time: slave nodes are repelled, then bodies released (B Fig. 9, R113)."""
+"""Iterations ("turns") of the paper's loop at one time: slave nodes are repelled, then released (B Fig. 9, R113)."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ from warpjld.fem.solver.static import solve
 __all__ = ["Turns"]
 
 _TURNS = 60
+"""Most turns at one time."""
 _LEAST, _MOST = 0.1, 2.0
-"""Factors by which relaxation may change in a turn."""
+"""Bounds on the factor by which the relaxation changes in a turn."""
 _RUNAWAY = 1e3
-"""Growth of the move from its least that is called divergence."""
+"""Motion in a turn over the smallest so far that counts as divergence."""
 
 
 class Turns:
-    """Repelling and releasing at one time, in turns.
+    """Repel–release iteration at one time.
 
     Attributes:
-        last: The last equilibrium of released bodies.
-        forces: Contact forces on all nodes under which it is one [N], shape (N, 3).
-        omega: Share of the forces found that bodies are released under, over those of the turn before; plainly all.
-        solves: Static solves, two a turn.
-        moves: Farthest move or overlap of any point in each turn [m].
-        report: How it ended, in words.
-        diverged: Whether turns did not settle, though each found its equilibria.
+        last: Last equilibrium of the released bodies.
+        forces: Contact forces on all nodes in that equilibrium [N], shape (N, 3).
+        omega: Relaxation factor ω; 1 without relaxation.
+        solves: Number of static solves, two per turn.
+        moves: Largest motion or overlap of any point in each turn [m].
+        report: How the iteration ended, in words.
+        diverged: Whether it did not converge although every static solve did.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Turns:
         self.diverged = False
 
     def through(self, last: Solution, first: Array | None, deepest: float) -> SolveStatus:
-        """Turn until no point moves any more. Overlap beyond ``deepest`` [m] at the start is left to shorter steps."""
+        """Iterate to convergence; fails if bodies overlap by more than ``deepest`` [m] at first (step too long)."""
         rest, surface = self._body.mesh.nodes, _surface(self._sides)
         self.last = self._solve(self._known, self._loaded(self.forces), last, first)
         if not self.last.converged:
@@ -78,20 +79,22 @@ class Turns:
             off = (found - self.forces).ravel()
             if self._aitken and len(before) and (off != before).any():
                 change = off - before
-                wanted = -self.omega * float(before @ change) / float(change @ change)
-                self.omega = float(np.clip(wanted, _LEAST * self.omega, min(_MOST * self.omega, 1.0)))
+                aitken = -self.omega * float(before @ change) / float(change @ change)
+                self.omega = float(np.clip(aitken, _LEAST * self.omega, min(_MOST * self.omega, 1.0)))
             before = off
             forces = self.forces + self.omega * off.reshape(-1, 3)
-            # from where they were repelled to, if under nearly those forces: that is in equilibrium already
+            # with nearly full forces the repelled configuration is almost in equilibrium already
             start = fixed if self.omega > 0.5 else self.last
             freed = self._solve(self._known, self._loaded(forces), start)
             if not freed.converged:
-                return self._ended(freed.status, f"released bodies give way under the forces found: {freed.message}")
+                return self._ended(
+                    freed.status, f"released bodies have no equilibrium under these forces: {freed.message}"
+                )
             self.last, self.forces = freed, forces
             self.solves += 2
             moved = float(np.abs(freed.displacement - u).max())
-            # what is relaxed moves less than it has yet to go
-            self.moves.append(max(moved, self._way(fixed, u)))
+            # with relaxation, bodies move less than their distance from the solution
+            self.moves.append(max(moved, self._repelled_by(fixed, u)))
             if self.moves[-1] < self._threshold:
                 return self._ended(SolveStatus.CONVERGED, f"{turn + 1} turns")
             if self.moves[-1] > _RUNAWAY * min(self.moves):
@@ -102,8 +105,8 @@ class Turns:
         status = SolveStatus.STAGNATED if grows >= 1.0 else SolveStatus.MAX_ITERATIONS
         return self._ended(status, f"repelling and releasing did not settle in {len(self.moves)} turns: {how}")
 
-    def _way(self, fixed: Solution, u: Array) -> float:
-        """How far nodes that stay pushed were repelled [m]."""
+    def _repelled_by(self, fixed: Solution, u: Array) -> float:
+        """Largest distance by which active nodes were repelled [m]."""
         pushed = np.concatenate([side.slave.nodes[side.touching] for side in self._sides])
         return float(np.abs(fixed.displacement[pushed] - u[pushed]).max(initial=0.0))
 
@@ -113,12 +116,12 @@ class Turns:
 
     @property
     def growth(self) -> float:
-        """Of the moves from turn to turn, as their geometric mean over the last ten; below 1 it settles."""
+        """Geometric mean of the ratio of successive moves over the last ten turns; below 1 the iteration converges."""
         moves = self.moves[-11:]
         return float((moves[-1] / moves[0]) ** (1.0 / (len(moves) - 1))) if len(moves) > 1 else np.nan
 
     def instant(self) -> ContactInstant:
-        """What was reached."""
+        """The equilibrium reached."""
         found = self.last.last
         touches = tuple(self._touches)
         return ContactInstant(
@@ -126,7 +129,8 @@ class Turns:
         )
 
     def _repelled(self, surface: Ints, meetings: list[Meeting]) -> tuple[Solution, Array]:
-        """Steps 2 to 4: bodies with the skin held and slave nodes on it, and the forces of that on all nodes [N]."""
+        """Steps 2 to 4: solution with the master's surface fixed and slave nodes on it, and contact forces on all nodes
+        [N], shape (N, 3)."""
         rest, u = self._body.mesh.nodes, self.last.displacement
         repelled = _without(_onto_skin(rest, surface, u[surface], self._sides, meetings), self._known)
         fixed = self._solve(self._known + repelled, self._loads, self.last)
@@ -153,7 +157,8 @@ def _surface(sides: list[Side]) -> Ints:
 
 
 def _onto_skin(rest: Array, surface: Ints, skin: Array, sides: list[Side], meetings: list[Meeting]) -> Prescribed:
-    """The skin where it is, and slave nodes on its polygons; a node that is both is skin."""
+    """Dirichlet conditions: the master's surface at its displacement, slave nodes at their targets on it; for nodes of
+    both, those of the master."""
     nodes = [surface]
     places = [skin]
     for side, meeting in zip(sides, meetings, strict=True):
@@ -165,5 +170,6 @@ def _onto_skin(rest: Array, surface: Ints, skin: Array, sides: list[Side], meeti
 
 
 def _without(given: Prescribed, known: Prescribed) -> Prescribed:
+    """``given`` without the degrees of freedom of ``known``."""
     keep = ~np.isin(given.degrees, known.degrees)
     return Prescribed(given.degrees[keep], given.values[keep])

@@ -1,1 +1,1 @@
-"""What a contact solve gives back."""
+"""Results of a contact solve: instants, contact of each pair, nodal values."""

@@ -1,4 +1,4 @@
-"""Results of a contact solve: equilibria, each pair's contact in them, and the state to go on from."""
+"""Results of a contact solve: equilibria, contact of each pair, and the state to continue from."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ __all__ = ["ContactError", "ContactInstant", "ContactSolution", "LastStep", "Pai
 
 @dataclass(frozen=True, eq=False)
 class PairContact:
-    """One pair at one instant; one row for each slave node that has something before it.
+    """Contact of one pair at one instant; one row per slave node within the search distance of the other side.
 
     Attributes:
         name: The pair's ``label``.
         nodes: Nodes of the body, shape (m,).
-        position: Where they are [m], shape (m, 3).
-        normal: Unit, outward from the slave, shape (m, 3).
-        pressure: [Pa], shape (m,); negative only where a bond holds.
+        position: Their positions [m], shape (m, 3).
+        normal: Unit normals, outward from the slave, shape (m, 3).
+        pressure: [Pa], shape (m,); negative only at bonds.
         traction: Force per area on the slave, friction included [Pa], shape (m, 3).
-        gap: Distance, negative where the surfaces overlap [m], shape (m,).
-        area: Slave area of each row [m²], shape (m,).
-        pressed: The part of it inside the border of contact, which runs between nodes [m²], shape (m,).
-        held: The part of that which friction or a bond holds; its border runs between nodes as well [m²], shape (m,).
-        slip: Tangential displacement relative to the other side since the instant before, or since friction took hold
-            of what was apart then [m], shape (m, 3).
-        sticking: Whether friction or a bond holds, shape (m,).
-        bonded: Whether the bond still holds, shape (m,).
-        nodal: Forces on every node of the body, both sides [N], shape (N, 3).
-        nodal_contact: What presses, area and slip on every node of the body, both sides.
+        gap: Signed distance, negative for penetration [m], shape (m,).
+        area: Tributary area of the slave node [m²], shape (m,).
+        pressed: Part of it in contact; the border of contact is interpolated between nodes [m²], shape (m,).
+        held: Part of that which sticks or is bonded; its border is interpolated as well [m²], shape (m,).
+        slip: Tangential displacement relative to the other side in the last load step, or since contact began in it
+            [m], shape (m, 3).
+        sticking: Whether the node sticks or is bonded, shape (m,).
+        bonded: Whether the bond holds, shape (m,).
+        nodal: Contact forces on all nodes of the body, both sides [N], shape (N, 3).
+        nodal_contact: Normal force, areas and slip on all nodes of the body, both sides.
     """
 
     name: str
@@ -57,12 +57,12 @@ class PairContact:
 
     @property
     def active(self) -> Mask:
-        """Rows that press, or are bonded, shape (m,)."""
+        """Mask of rows with pressure or a bond, shape (m,)."""
         return (self.pressure > 0.0) | self.bonded
 
     @property
     def force(self) -> Array:
-        """Resultant on the slave [N], shape (3,)."""
+        """Resultant force on the slave [N], shape (3,)."""
         out: Array = self.area @ self.traction
         return out
 
@@ -73,10 +73,11 @@ class PairContact:
 
     @property
     def contact_area(self) -> float:
-        """Area under pressure [m²], inside a border that is finer than the mesh.
+        """Contact area [m²], with its border interpolated between nodes.
 
-        Its radius beside Hertz's, five faces or more over it: within 1.5 % at nodes against an obstacle, 2 to 3 % less
-        at ``sites="faces"``, 1 to 2 % less between two meshes (two to four faces over it: up to 8 % less).
+        Error of its radius against Hertz with five or more faces per radius: within 1.5 % at nodes against an obstacle,
+        2 to 3 % too small with ``sites="faces"``, 1 to 2 % too small between two meshes (up to 8 % with two to four
+        faces).
         """
         return float(self.pressed.sum())
 
@@ -87,23 +88,23 @@ class PairContact:
 
     @property
     def centre(self) -> Array:
-        """Centre of pressure [m], shape (3,); NaN where nothing presses."""
+        """Centre of pressure [m], shape (3,); NaN without pressure."""
         weight = self.area * np.maximum(self.pressure, 0.0)
         total = float(weight.sum())
         return weight @ self.position / total if total > 0.0 else np.full(3, np.nan)
 
     @property
     def sliding(self) -> float:
-        """Share of the area under pressure that slides; NaN where nothing presses."""
+        """Share of the contact area that slides; NaN without contact."""
         total = self.contact_area
         return 1.0 - float(self.held.sum()) / total if total > 0.0 else float("nan")
 
     @property
     def penetration(self) -> float:
-        """Deepest overlap [m], ≥ 0.
+        """Deepest penetration [m], ≥ 0.
 
-        Between two meshes of averages over the nodes' surroundings, as they are held apart: single nodes of balls whose
-        faces do not match stand up to a tenth of an edge inside the other side's polygons, most at contact's border.
+        Between two meshes that of weighted (mortar) gaps, which are constrained; single nodes of balls with
+        non-matching faces penetrate the other side by up to a tenth of an edge, most at the border of contact.
         """
         return float(np.maximum(-self.gap, 0.0).max(initial=0.0))
 
@@ -113,13 +114,13 @@ class ContactInstant:
     """Equilibrium at one time.
 
     Attributes:
-        time: When.
-        displacement: From rest [m], shape (N, 3).
-        reactions: Forces that hold the prescribed degrees of freedom [N], zero elsewhere, shape (N, 3) (B eq. 8).
-        touches: One for each pair.
-        solves: Linear solves that this load step took, steps that failed included.
+        time: Time.
+        displacement: Displacement from rest [m], shape (N, 3).
+        reactions: Forces at prescribed degrees of freedom [N], zero elsewhere, shape (N, 3) (B eq. 8).
+        touches: Contact of each pair.
+        solves: Linear solves since the previous instant, failed steps included.
         iterations: Iterations of these.
-        residual: True residual over the forces that balance, float64.
+        residual: True residual relative to the forces in balance, in float64.
     """
 
     time: float
@@ -133,13 +134,13 @@ class ContactInstant:
 
 @dataclass(frozen=True, eq=False)
 class LastStep:
-    """Where the load step that found an equilibrium began: what its sensitivity is taken from.
+    """Start of the load step that found an equilibrium, as needed for its sensitivities.
 
     Attributes:
-        time: At its start.
-        displacement: At its start [m], shape (N, 3).
-        slips: Of each interface's sites during the step, as friction counts them [m], shape (s, 3).
-        areas: What tractions at the sites were multiplied with [m²], shape (s,).
+        time: Time at its start.
+        displacement: Displacement at its start [m], shape (N, 3).
+        slips: Slip of each interface's sites in the step, with friction [m], shape (s, 3).
+        areas: Areas by which tractions at the sites were multiplied [m²], shape (s,).
     """
 
     time: float
@@ -150,17 +151,18 @@ class LastStep:
 
 @dataclass(frozen=True, eq=False)
 class ContactSolution:
-    """Instants reached, and what is needed to go on from the last.
+    """Instants reached, and the state needed to continue from the last.
 
     Attributes:
-        status: How it ended.
+        status: How the run ended.
         instants: One for each time reached, in order.
-        message: For people: what ended it.
-        states: Contact state at the last instant, one for each pair.
-        steps: Load steps taken between instants, those that halving added included, and linear solves of each.
-        loads: The loads at the last instant.
-        correction_rate: How fast the last step left what was expected [m per unit of time], (N, 3).
-        last_step: Where the step began that found the last instant; None where that is not known.
+        message: Explanation of the status.
+        states: Contact state of each pair at the last instant.
+        steps: Number of linear solves of each load step taken, including those added by halving.
+        loads: Loads at the last instant.
+        correction_rate: Deviation of the last step from its predictor per unit of time [m], shape (N, 3); None if not
+            known.
+        last_step: Start of the step that found the last instant; None if not known.
     """
 
     status: SolveStatus
@@ -184,7 +186,7 @@ class ContactSolution:
 
 
 class ContactError(WarpjldError):
-    """A contact solve that did not get to its last time. ``solution`` holds what was reached."""
+    """A contact solve did not reach its last time; ``solution`` holds the instants found."""
 
     def __init__(self, solution: ContactSolution) -> None:
         self.solution = solution

@@ -1,7 +1,7 @@
-"""Contact on the nodes of both sides of a pair, whichever of them carries the multipliers (R95).
+"""Contact values on the nodes of both sides of a pair, slave and master alike (R95).
 
-A slave's points press on its own nodes with shape functions, and on the other side's with those there; areas and slips
-are handed over with the same weights. Sums over the nodes of either side are therefore the pair's own.
+Normal forces at the slave's points are distributed to both sides' nodes by their shape functions; areas and slips are
+transferred with the same weights. Sums over the nodes of either side therefore equal those of the pair.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ __all__ = ["NodalContact", "stacked", "to_nodes", "tributary_areas"]
 
 @dataclass(frozen=True, eq=False)
 class NodalContact:
-    """Of one pair on all nodes of the body, shape (N,), or of several, shape (P, N).
+    """Contact values of one pair on all nodes of the body, shape (N,), or of several pairs, shape (P, N).
 
     Attributes:
-        force: That presses [N].
-        area: Under pressure, inside a border that runs between nodes [m²] (``Touch.pressed``).
-        held: The part of it that friction or a bond holds [m²] (``Touch.held``).
-        slid: Integral over it of the way along the other side since the instant before [m³].
+        force: Normal force [N].
+        area: Contact area [m²] (``PairContact.pressed``).
+        held: Part of it that sticks or is bonded [m²] (``PairContact.held``).
+        slid: Integral over it of the slip distance [m³].
     """
 
     force: Array
@@ -35,23 +35,23 @@ class NodalContact:
     slid: Array
 
     def of(self, which: Any) -> NodalContact:
-        """A part of it, by an index into its arrays."""
+        """The same values, indexed by ``which``."""
         return NodalContact(*(getattr(self, one.name)[which] for one in fields(self)))
 
 
 def to_nodes(
     slave: Ints32, push: Array, pressed: Array, held: Array, slip: Array, there: Any, count: int
 ) -> NodalContact:
-    """Hand what slave nodes (n) know to all nodes.
+    """Distribute contact values at slave nodes to the nodes of both sides.
 
     Args:
-        slave: The nodes, shape (n,).
-        push: What presses on them [N], shape (n,).
-        pressed: Their area under pressure [m²], shape (n,).
-        held: What of it friction or a bond holds [m²], shape (n,).
-        slip: Relative displacement since the instant before [m], shape (n, 3).
-        there: Weights of the other side's nodes for each of them, rows summing to one, or empty, sparse (n, N).
-        count: Nodes of the body, N.
+        slave: Slave nodes, shape (n,).
+        push: Normal forces on them [N], shape (n,).
+        pressed: Their contact areas [m²], shape (n,).
+        held: Parts of these that stick or are bonded [m²], shape (n,).
+        slip: Relative tangential displacements [m], shape (n, 3).
+        there: Weights of the master's nodes for each slave node, rows sum to one, or empty; sparse (n, N).
+        count: Number of nodes of the body, N.
     """
     slid = pressed * np.linalg.norm(slip, axis=1)
     both = []
@@ -64,20 +64,20 @@ def to_nodes(
 
 
 def stacked(nodal_contacts: Sequence[NodalContact], count: int) -> NodalContact:
-    """Those of P pairs, shape (P, N)."""
-    nothing = np.zeros((0, count))
+    """Contact values of P pairs as arrays of shape (P, N)."""
+    empty = np.zeros((0, count))
     return NodalContact(
         *(
-            np.stack([getattr(i, f.name) for i in nodal_contacts]) if nodal_contacts else nothing
+            np.stack([getattr(i, f.name) for i in nodal_contacts]) if nodal_contacts else empty
             for f in fields(NodalContact)
         )
     )
 
 
 def tributary_areas(mesh: HexMesh, faces: Ints32 | str, x: Array) -> Array:
-    """A quarter of the area of all faces around every node at positions x (N, 3) [m²], 0 elsewhere, shape (N,).
+    """Tributary areas: a quarter of the faces around every node at positions x (N, 3) [m²], 0 elsewhere, shape (N,).
 
-    What presses on a node over it is the pressure there that tables and pictures show.
+    The pressure of tables and pictures is the normal force on a node over its tributary area.
     """
     quads = mesh.quads(mesh.face_set(faces) if isinstance(faces, str) else faces)
     corner = x[quads]

@@ -1,4 +1,4 @@
-"""Contact of a pair on its slave nodes, from its contact points."""
+"""Evaluation of a pair's contact at its slave nodes from its contact points."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from warpjld.geometry.rotations import unit
 __all__ = ["touch_of"]
 
 _LEAST = 1e-6
-"""Share of Coulomb's limit that a node which sticks has left at least."""
+"""Least reserve of a sticking node, relative to its Coulomb bound."""
 
 
 def touch_of(
@@ -30,17 +30,19 @@ def touch_of(
     modulus: Array,
     x: Array,
 ) -> PairContact:
-    """A pair at an instant, from its points (m) to its slave nodes (n): what presses on a node, over its share of the
-    surface (between two meshes the multipliers themselves swing from node to node).
+    """Contact of a pair at an instant, from its points (m) to its slave nodes (n).
+
+    Values at a node are weighted averages over the points around it; between two meshes the multipliers themselves
+    oscillate from node to node.
 
     Args:
-        interface, points, tractions: The pair, its points, theirs.
+        interface, points, tractions: The interface, its contact points, their tractions.
         slip: Relative displacement in the step [m], shape (m, 3).
-        bonded: Whether the bond holds, one for each site.
+        bonded: Mask of the sites whose bond holds.
         modulus: E* at all slave nodes [Pa], for the border of contact (see ``ContactArea``).
         x: Positions of the body's nodes [m], shape (N, 3).
     """
-    share = points.weights[:, interface.slave.nodes].maximum(0.0)  # of what a point stands for, the slave's side
+    share = points.weights[:, interface.slave.nodes].maximum(0.0)  # weights of the slave side
     weight = share.T.multiply(points.area).tocsr()
     area = np.asarray(weight.sum(axis=1)).ravel()
     near = np.flatnonzero(area > 0.0)
@@ -83,7 +85,7 @@ def touch_of(
 
 
 def _gaps(interface: Interface, points: ContactPoints, near: Ints, mean: Any) -> Array:
-    """Gaps of slave nodes: their own between meshes, else the least of their points [m], shape (n,)."""
+    """Gaps of slave nodes [m], shape (n,): their own between meshes, else the smallest of their points."""
     if len(near) == 0:
         return np.empty(0)
     least = np.minimum.reduceat(points.gap[mean.indices], mean.indptr[:-1])

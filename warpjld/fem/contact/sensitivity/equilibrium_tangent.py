@@ -1,4 +1,4 @@
-"""A contact equilibrium's linear system, factorised once, and its answers to parameters."""
+"""Tangent of a contact equilibrium: its linear system, factorised once, solved for any number of parameters."""
 
 from __future__ import annotations
 
@@ -26,32 +26,33 @@ from warpjld.runtime.threads import one_blas_thread
 __all__ = ["EquilibriumTangent", "Response", "SensitivityError"]
 
 _STIFF = 100.0
-"""E over the stiffness of the nodes that a point stands on."""
+"""Penalty E over the stiffness of a point's nodes."""
 _STEADY = 1e-6
-"""Stiffness that steadies, over the nodes'."""
+"""Stabilising stiffness (``steadied``), over that of the nodes."""
 _NONE = "the equilibrium has no derivative"
+"""Beginning of error messages."""
 _SINGULAR = 1e13
-"""Condition number from which on a body is free."""
+"""Condition number above which a body counts as free to move."""
 _FAR = 1e-7
-"""Way of the node that moves most in differences of what presses on nodes [m]."""
+"""Largest nodal displacement in the finite difference of normal forces on nodes [m]."""
 _ROUNDS, _EXACT = 60, 1e-9
-"""Updates of multipliers, and gap left over what the parameter would open."""
+"""Most multiplier updates, and their tolerance: violation of the constraints relative to the largest so far."""
 
 
 class SensitivityError(WarpjldError):
-    """An equilibrium that has no derivative: a body is free to move, or the tangent is singular."""
+    """The equilibrium has no derivative: a body is free to move, or the tangent is singular."""
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """How an equilibrium follows one parameter: derivatives by it, per unit.
+    """Derivatives of an equilibrium with respect to one parameter, per unit of it.
 
     Attributes:
-        displacement: Of all nodes [m], shape (N, 3).
-        reactions: Of what holds prescribed degrees of freedom [N], zero elsewhere, shape (N, 3).
-        nodal: Contact forces of each pair on all nodes [N], shape (P, N, 3).
+        displacement: Of the displacements of all nodes [m], shape (N, 3).
+        reactions: Of the reactions at prescribed degrees of freedom [N], zero elsewhere, shape (N, 3).
+        nodal: Of the contact forces of each pair on all nodes [N], shape (P, N, 3).
         sites: Active sites of each pair.
-        pressing: What presses at them: pressures [Pa] between two meshes, forces [N] against an obstacle.
+        pressing: Of the normal multipliers there: pressures [Pa] between two meshes, forces [N] against an obstacle.
     """
 
     displacement: Array
@@ -62,19 +63,19 @@ class Response:
 
 
 class EquilibriumTangent:
-    """The linear system of the last equilibrium of a solution.
+    """Linear system (7) of the last equilibrium of a solution.
 
     Args:
-        body: All bodies, merged, as they were solved.
-        pairs: The pairs, likewise.
-        solution: Its last instant is differentiated, with the load step that found it.
+        body: All bodies, merged, as solved.
+        pairs: Contact pairs, as solved.
+        solution: Solution whose last instant is differentiated, with the load step that found it.
         prescribed: Prescribed degrees of freedom there, shape (n,).
-        steadied: Whether bodies that may move are held by a stiffness of a millionth of their nodes': forces are known
-            then although places are not.
+        steadied: Whether to add a stiffness of 1e-6 of the nodes' own, so that forces are determined although the
+            position of a free body is not.
 
     Raises:
-        InputError: A solution that does not know its last step, or of other bodies.
-        SensitivityError: No derivative.
+        InputError: A solution without its last step, or of other bodies.
+        SensitivityError: The equilibrium has no derivative.
     """
 
     def __init__(
@@ -131,10 +132,10 @@ class EquilibriumTangent:
         return factor
 
     def response(self, change: Perturbation) -> Response:
-        """How the equilibrium follows a parameter.
+        """Derivative of the equilibrium by a parameter.
 
         Raises:
-            SensitivityError: The tangent is so near to singular that contact is not kept.
+            SensitivityError: The multiplier iteration does not converge (nearly singular tangent).
         """
         explicit, fixed = self._explicit(change)
         du = np.zeros(self._body.degrees)
@@ -168,12 +169,12 @@ class EquilibriumTangent:
 
     @property
     def pushed(self) -> Array:
-        """What presses on every node, as ``NodalContact.force`` has it [N], shape (P, N)."""
-        nothing = np.zeros_like(self._u)
-        return self._pushed(nothing, [np.zeros(len(one.sites)) for one in self.interfaces])
+        """Normal force on every node, as ``NodalContact.force`` [N], shape (P, N)."""
+        zero = np.zeros_like(self._u)
+        return self._pushed(zero, [np.zeros(len(one.sites)) for one in self.interfaces])
 
     def pushes(self, response: Response) -> Array:
-        """How ``pushed`` follows, shape (P, N)."""
+        """Derivative of ``pushed``, by central differences, shape (P, N)."""
         step = _FAR / max(float(np.abs(response.displacement).max(initial=0.0)), _FAR)
         ends = [
             self._pushed(by * response.displacement, [by * pressing for pressing in response.pressing])
@@ -182,7 +183,7 @@ class EquilibriumTangent:
         return (ends[0] - ends[1]) / (2.0 * step)
 
     def _pushed(self, move: Array, more: Sequence[Array]) -> Array:
-        """After a move (N, 3), where points press by so much more."""
+        """Normal force on every node after a move (N, 3), with increments of the multipliers."""
         out = np.zeros((len(self.interfaces), len(self._u)))
         x = self._body.mesh.nodes + self._u + move
         for k, (interface, one) in enumerate(zip(self._interfaces, self.interfaces, strict=True)):
@@ -194,7 +195,8 @@ class EquilibriumTangent:
         return out
 
     def _explicit(self, change: Perturbation) -> tuple[list[Array], list[Array]]:
-        """What the parameter changes with u and multipliers held: tractions (3k,) and constraints of each interface."""
+        """Partial derivatives by the parameter at constant u and multipliers: tractions (3k,) and constraints of each
+        interface."""
         tractions, fixed = [], []
         for k, one in enumerate(self.interfaces):
             force, gap = np.zeros(3 * len(one.sites)), np.zeros(one.constraints.shape[0])
@@ -209,7 +211,7 @@ class EquilibriumTangent:
         return tractions, fixed
 
     def _stiffer(self, change: Perturbation) -> Array:
-        """Less the internal forces that changed moduli add [N], shape (3N,)."""
+        """Negative change of the internal forces by changed moduli [N], shape (3N,)."""
         if change.stiffness is None:
             return np.zeros(self._body.degrees)
         forces = []
@@ -217,11 +219,12 @@ class EquilibriumTangent:
             other = copy(self._body)
             other.constants = self._body.constants.copy()
             other.constants[:, :3] *= (1.0 + factor * change.stiffness)[:, None]
-            forces.append(_internal(other, self._u.reshape(-1)))
+            forces.append(Elastic(other).forces(self._u.reshape(-1)).forces)
         return forces[0] - forces[1]
 
     def _solved(self, du: Array, pull: Array, fixed: list[Array]) -> list[Array]:
-        """Complete du (3N,) in place; the multipliers' derivatives of each interface."""
+        """Solve (7): fill in du (3N,) at free degrees of freedom; returns the derivatives of each interface's
+        multipliers."""
         free, known = self.free, du.copy()
         held = [np.zeros(len(gap)) for gap in fixed]
         size, before = 0.0, np.inf
@@ -245,7 +248,7 @@ class EquilibriumTangent:
 
 
 def _pushing(points: ContactPoints, slave: Ints32, force: Array) -> Array:
-    """What presses on every node where points press with forces (m,) [N], shape (N,); as ``touch_of`` has it."""
+    """Normal force on every node [N], shape (N,), from forces at points (m,) [N], distributed as in ``touch_of``."""
     share = points.weights[:, slave].maximum(0.0)
     weight = share.T.multiply(points.area).tocsr()
     area = np.asarray(weight.sum(axis=1)).ravel()
@@ -257,11 +260,6 @@ def _pushing(points: ContactPoints, slave: Ints32, force: Array) -> Array:
 
 
 def _holding(one: InterfaceSlopes, stiffness: Array) -> Array:
-    """E of an interface's constraints, from the nodes' stiffness (N,) [N/m]."""
+    """Penalties E of an interface's constraints, from the nodes' stiffness (N,) [N/m]."""
     stiff = _STIFF * (abs(one.weights) @ stiffness) / one.scale
     return np.concatenate([stiff, np.repeat(stiff[one.sticks], 2)])
-
-
-def _internal(body: Body, u: Array) -> Array:
-    """Internal forces [N], shape (3N,)."""
-    return Elastic(body).forces(u).forces

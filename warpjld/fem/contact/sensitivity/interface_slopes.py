@@ -1,4 +1,4 @@
-"""One interface at an equilibrium: terms of its active points in the linear system."""
+"""Terms of an interface's active points in the linear system of the sensitivity."""
 
 from __future__ import annotations
 
@@ -23,31 +23,32 @@ from warpjld.geometry.rotations import unit
 __all__ = ["InterfaceSlopes", "interface_slopes"]
 
 _LEAST_SLIP = 1e-7
-"""Slip over an edge below which the direction of what slides is taken as fast as it would turn with this one."""
+"""Lower bound on the slip, in element edges, in the derivative of the slip direction, which is singular at zero
+slip."""
 
 
 @dataclass(frozen=True, eq=False)
 class InterfaceSlopes:
-    """Active points (k) of an interface; derivatives by the displacement (3N,) are sparse.
+    """Active points (k) of an interface, with sparse derivatives by the displacement u (3N,).
 
     Attributes:
-        sites: Of the interface, shape (k,).
+        sites: Sites of the points, shape (k,).
         weights: W, ``csr_array`` (k, N).
-        scale: A between two meshes, where multipliers are pressures [m²]; 1 against an obstacle, where they are forces:
-            the area, which changes too, then drops out. Shape (k,).
+        scale: Tributary area A between two meshes, where multipliers are pressures [m²]; 1 against an obstacle, where
+            they are forces, so that the changing area drops out. Shape (k,).
         normal: n, shape (k, 3).
-        press: p over the scale's unit ([Pa] or [N]), shape (k,).
-        rub: q likewise, shape (k, 3).
-        slip: r = W (u − u₀) − carried, before it is brought into the tangent plane [m], shape (k, 3).
-        sticks, slides: Shape (k,) each; what does neither has no friction.
+        press: Normal multiplier p [Pa or N], shape (k,).
+        rub: Friction q [Pa or N], shape (k, 3).
+        slip: r = W (u − u₀) − carried, before projection onto the tangent plane [m], shape (k, 3).
+        sticks, slides: Masks, shape (k,); points with neither have no friction.
         friction: μ.
-        edge: [m], shape (k,).
-        by_normal: n by u, (3k, 3N).
-        by_gap: g by u, (k, 3N).
-        by_slip: r by u, (3k, 3N).
-        by_weights: Forces by u through weights and areas [N/m], (3N, 3N); None against an obstacle.
-        obstacle: Slopes of the obstacle; None between two meshes.
-        points: Where the points are [m], shape (k, 3).
+        edge: Element edge [m], shape (k,).
+        by_normal: ∂n/∂u, (3k, 3N).
+        by_gap: ∂g/∂u, (k, 3N).
+        by_slip: ∂r/∂u, (3k, 3N).
+        by_weights: Derivative of nodal forces through weights and areas [N/m], (3N, 3N); None against an obstacle.
+        obstacle: Spatial derivatives of the obstacle; None between two meshes.
+        points: Positions of the points [m], shape (k, 3).
     """
 
     sites: Ints
@@ -70,12 +71,12 @@ class InterfaceSlopes:
 
     @cached_property
     def spreading(self) -> Any:
-        """From tractions, or forces, of the points (3k) to nodal forces (3N)."""
+        """Matrix from tractions or forces of the points (3k) to nodal forces (3N)."""
         return csr_array(block_table(self.weights.T @ diags_array(self.scale)))
 
     @cached_property
     def plane(self) -> Array:
-        """T of what sticks, shape (j, 3, 2)."""
+        """Tangent bases T of the sticking points, shape (j, 3, 2)."""
         n = self.normal[self.sticks]
         least = np.eye(3)[np.abs(n).argmin(axis=1)]
         first = unit(np.cross(n, least))
@@ -83,11 +84,11 @@ class InterfaceSlopes:
 
     @cached_property
     def path(self) -> Array:
-        """t of what slides, zero elsewhere, shape (k, 3)."""
+        """Friction directions t of the sliding points, zero elsewhere, shape (k, 3)."""
         return np.where(self.slides[:, None], unit(self.rub), 0.0)
 
     def pulled(self, relative: Any, normal: Any) -> Any:
-        """Change of the tangential slip s from those of r and n: tables (3k, …), or vectors (3k,)."""
+        """Change of the tangential slip s from changes of r and n: matrices (3k, …), or vectors (3k,)."""
         n, r = self.normal, self.slip
         along = np.einsum("ki,ki->k", n, r)
         across = np.eye(3) - n[:, :, None] * n[:, None, :]
@@ -96,11 +97,11 @@ class InterfaceSlopes:
 
     @cached_property
     def by_tangential(self) -> Any:
-        """s by u, (3k, 3N)."""
+        """∂s/∂u, (3k, 3N)."""
         return csr_array(self.pulled(self.by_slip, self.by_normal))
 
     def traction(self, slip: Any, normal: Any) -> Any:
-        """Change of τ = q − p n with multipliers held, from those of s and n: tables (3k, …) or vectors (3k,)."""
+        """Change of τ = q − p n at constant multipliers from changes of s and n: matrices (3k, …) or vectors (3k,)."""
         stick = np.where(self.sticks[:, None, None], self.normal[:, :, None] * self.rub[:, None, :], 0.0)
         turning = self.press[:, None, None] * np.eye(3) + stick
         far = np.maximum(np.linalg.norm(tangential(self.slip, self.normal), axis=1), _LEAST_SLIP * self.edge)
@@ -110,7 +111,7 @@ class InterfaceSlopes:
 
     @cached_property
     def by_traction(self) -> Any:
-        """τ by u, multipliers held, (3k, 3N)."""
+        """∂τ/∂u at constant multipliers, (3k, 3N)."""
         return csr_array(self.traction(self.by_tangential, self.by_normal))
 
     @cached_property
@@ -121,7 +122,7 @@ class InterfaceSlopes:
 
     @cached_property
     def of_multipliers(self) -> Any:
-        """τ by the multipliers: p of all, then η of what sticks, (3k, k + 2j)."""
+        """∂τ/∂λ: by p of all points, then by η of the sticking ones, (3k, k + 2j)."""
         count, stuck = len(self.sites), np.flatnonzero(self.sticks)
         pressing = inner_rows(-self.normal + self.friction * self.path).T
         row = (3 * stuck[:, None, None] + np.arange(3)[None, :, None]).repeat(2, axis=2)
@@ -132,16 +133,16 @@ class InterfaceSlopes:
 
     @cached_property
     def constraints(self) -> Any:
-        """C, (k + 2j, 3N)."""
+        """Constraint Jacobian C, (k + 2j, 3N)."""
         return csr_array(vstack([self.by_gap, self._held(self.by_tangential)], format="csr"))
 
     def _held(self, slip: Any) -> Any:
-        """Tᵀ of what sticks of tables (3k, …), or of vectors (3k,)."""
+        """Tᵀ at the sticking points, applied to matrices (3k, …) or vectors (3k,)."""
         count = len(self.sites)
         return csr_array(self.of_multipliers[:, count:]).T @ slip
 
     def moved(self, twist: ObstacleTwist) -> tuple[Array, Array]:
-        """What an obstacle's motion changes with u and multipliers held: τ (3k,), and the constraints (k + 2j,)."""
+        """Partial derivatives of τ (3k,) and of the constraints (k + 2j,) by an obstacle's motion."""
         assert self.obstacle is not None
         v, out = twist.at(self.points), self.obstacle
         turned = np.cross(twist.turn, -self.normal) - np.einsum("kij,kj->ki", out.normal, v)
@@ -152,23 +153,23 @@ class InterfaceSlopes:
         return np.asarray(self.traction(slip, normal)), np.concatenate([gap, self._held(slip)])
 
     def rubbed(self) -> Array:
-        """τ by μ, shape (3k,)."""
+        """∂τ/∂μ, shape (3k,)."""
         return (self.press[:, None] * self.path).ravel()
 
 
 def interface_slopes(
     interface: Interface, state: ContactState, step: LastStep, number: int, u: Array, rest: Array, time: float
 ) -> InterfaceSlopes:
-    """Slopes at displacement u (N, 3).
+    """Terms of an interface at an equilibrium.
 
     Args:
         interface: The interface.
-        state: Its multipliers at the equilibrium.
+        state: Its contact state at the equilibrium.
         step: The last load step.
-        number: Of the interface, in the step's slips.
-        u: [m], shape (N, 3).
+        number: Index of the interface.
+        u: Displacement at the equilibrium [m], shape (N, 3).
         rest: Rest positions [m], shape (N, 3).
-        time: Of the equilibrium.
+        time: Time of the equilibrium.
     """
     x = rest + u
     points = interface.points(x, step.time, time)
@@ -185,7 +186,7 @@ def interface_slopes(
             interface, points, rows, tractions, x, u - step.displacement
         )
         slopes, scale = None, points.area[rows]
-    # multipliers were found with the areas that the solver had last seen
+    # forces are the multipliers times the areas that the solver used last
     force = (step.areas[number][at[rows]] if slopes is not None else np.ones(len(rows)))[:, None]
     normal, rub = points.normal[rows], tangential(state.friction[at[rows]], points.normal[rows])
     sticks = state.sticking[at[rows]] | state.bonded[at[rows]]
@@ -215,7 +216,7 @@ def interface_slopes(
 def _by_obstacle(
     interface: Interface, points: ContactPoints, rows: Ints, x: Array, before: float, time: float
 ) -> tuple[Any, Any, Any, ObstacleSlopes]:
-    """n, g, r by u of active points against an obstacle, and its slopes."""
+    """∂n/∂u, ∂g/∂u, ∂r/∂u of active points against an obstacle, and the obstacle's spatial derivatives."""
     master = interface.pair.master
     assert isinstance(master, Obstacle)
     weights = points.weights[rows]
@@ -228,7 +229,7 @@ def _by_obstacle(
 def _by_mortar(
     interface: Interface, points: ContactPoints, rows: Ints, tractions: Array, x: Array, moved: Array
 ) -> tuple[Any, Any, Any, Any]:
-    """n, g, r by u of active points between two meshes, and forces by what the weights and areas do."""
+    """∂n/∂u, ∂g/∂u, ∂r/∂u of active points between two meshes, and derivatives of nodal forces through weights."""
     mortar = interface.mortar
     assert mortar is not None
     count = len(points.sites)
@@ -244,7 +245,7 @@ def _by_mortar(
 
 
 def _weights_by(pairs: FacetPairs, points: ContactPoints, field: Array) -> Any:
-    """How W f of a vector field f (N, 3) changes with the weights, ``csr_array`` (3m, 3N)."""
+    """Derivative of W f through the weights, for a constant vector field f (N, 3), ``csr_array`` (3m, 3N)."""
     value = points.weights @ field
     at, corner = field[pairs.column[:, ::3] // 3], pairs.corner
     spread = np.einsum("pkab,pbi->pkai", pairs.own, at[:, :4]) - np.einsum("pkab,pbi->pkai", pairs.far, at[:, 4:])
@@ -258,7 +259,7 @@ def _weights_by(pairs: FacetPairs, points: ContactPoints, field: Array) -> Any:
 
 
 def _diagonal(blocks: Array) -> Any:
-    """Blocks (k, 3, 3) on the diagonal, ``bsr_array`` (3k, 3k)."""
+    """Block-diagonal matrix of blocks (k, 3, 3), (3k, 3k)."""
     count = len(blocks)
     table = (np.ascontiguousarray(blocks), np.arange(count), np.arange(count + 1))
     return csr_array(bsr_array(table, shape=(3 * count, 3 * count)))

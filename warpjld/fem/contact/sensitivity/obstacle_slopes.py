@@ -1,4 +1,4 @@
-"""How an obstacle's distance, normal and motion change from point to point, by central differences."""
+"""Spatial derivatives of an obstacle's distance, normal and motion, by central differences."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from warpjld.fem.contact.obstacles.obstacle import Obstacle
 __all__ = ["ObstacleSlopes", "obstacle_slopes"]
 
 _STEP = 1e-4
-"""Of the differences, over an edge: facets of a mesh are far larger, rounding far smaller."""
+"""Step of the differences, in element edges: far below the size of facets, far above rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObstacleSlopes:
-    """Derivatives by the place of m points.
+    """Derivatives with respect to the positions of m points.
 
     Attributes:
         distance: Gradient of the signed distance, shape (m, 3).
-        normal: Of the outward normal [1/m], shape (m, 3, 3), the last axis by the place.
-        carried: Of what the obstacle moved at the point since the start of the step, shape (m, 3, 3).
+        normal: Derivative of the outward normal [1/m], shape (m, 3, 3), last axis by position.
+        carried: Derivative of the obstacle's displacement since the start of the step, shape (m, 3, 3), likewise.
     """
 
     distance: Array
@@ -31,13 +31,13 @@ class ObstacleSlopes:
 
 
 def obstacle_slopes(obstacle: Obstacle, points: Array, before: float, time: float, edge: Array) -> ObstacleSlopes:
-    """Slopes at points (m, 3) [m] of an obstacle as it is at ``time``, for a step that began at ``before``.
+    """Spatial derivatives of an obstacle at ``time``, for a step that began at ``before``.
 
     Args:
         obstacle: The obstacle.
-        points: [m], shape (m, 3).
-        before, time: Of the step.
-        edge: Of the faces at the points [m], shape (m,).
+        points: Positions [m], shape (m, 3).
+        before, time: Start and end of the step.
+        edge: Edges of the faces at the points [m], shape (m,).
     """
     count = len(points)
     distance, normal, carried = np.zeros((count, 3)), np.zeros((count, 3, 3)), np.zeros((count, 3, 3))

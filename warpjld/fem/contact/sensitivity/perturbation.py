@@ -1,4 +1,4 @@
-"""What an equilibrium is differentiated by: prescribed displacements, an obstacle's place, moduli, friction."""
+"""Perturbations of a contact equilibrium: prescribed displacements, obstacle motion, moduli, friction."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ __all__ = ["ObstacleTwist", "Perturbation"]
 
 @dataclass(frozen=True, eq=False)
 class ObstacleTwist:
-    """An infinitesimal rigid motion x → x + shift + turn × (x − about), at the end of the step alone.
+    """Infinitesimal rigid motion x → x + shift + turn × (x − about) of an obstacle at the end of the step.
 
     Attributes:
-        shift: Per unit of the parameter [m], shape (3,).
+        shift: Translation per unit of the parameter [m], shape (3,).
         turn: Rotation vector per unit of the parameter [rad], shape (3,).
-        about: [m], shape (3,).
+        about: Centre of rotation [m], shape (3,).
     """
 
     shift: Array
@@ -27,19 +27,20 @@ class ObstacleTwist:
     about: Array = field(default_factory=lambda: np.zeros(3))
 
     def at(self, points: Array) -> Array:
-        """How points (n, 3) [m] move, shape (n, 3)."""
+        """Displacements of points (n, 3) [m] per unit of the parameter, shape (n, 3)."""
         return np.asarray(self.shift + np.cross(self.turn, points - self.about))
 
 
 @dataclass(frozen=True, eq=False)
 class Perturbation:
-    """One parameter θ, by what it changes per unit at the end of the last load step.
+    """Changes of the equations at the end of the last load step per unit of a parameter θ.
 
     Attributes:
-        prescribed: Prescribed displacements [m], shape (3N,), zero at what is free; None: none.
-        obstacles: Pairs' obstacles that move, by the pairs' numbers.
-        friction: Change of Coulomb's μ, by the pairs' numbers.
-        stiffness: Change of each element's moduli, as a share of them, shape (E,); None: none.
+        prescribed: Change of the prescribed displacements [m], shape (3N,), zero at free degrees of freedom; None:
+            none.
+        obstacles: Motion of obstacles, by index of the pair.
+        friction: Change of Coulomb's μ, by index of the pair.
+        stiffness: Relative change of each element's moduli, shape (E,); None: none.
     """
 
     prescribed: Array | None = None

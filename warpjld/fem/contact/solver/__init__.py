@@ -1,52 +1,55 @@
-"""The contact solver: augmented Lagrangian, Newton's method on bodies and contact together, load steps.
+"""Contact solver: augmented Lagrangian method with Newton's method on bodies and contact together, in load steps.
 
-Which algorithm it is. Notation: u displacement, x = X + u; of contact point a: area A, weights W (mortar's, or one node
-against an obstacle), unit normal n to the other side, gap g = −n·(W x), slip s = (I − n nᵀ) W (u − u₀) since the step
-began (less the obstacle's own), multipliers λ_n ≥ 0 and λ_t, penalty ε, friction μ. Equation numbers are this file's
-own.
+Notation: u displacement, x = X + u; of contact point a: area A, weights W (mortar weights, or a single node against an
+obstacle), unit normal n towards the other side, gap g = −n·(W x), slip s = (I − n nᵀ) W (u − u₀) since the start of the
+load step (minus the obstacle's own motion), multipliers λ_n ≥ 0 and λ_t, penalty ε, friction coefficient μ. Equation
+numbers are those of this file.
 
     (1)  R(u, λ) = f_ext(u) − f_int(u) + Σ_a A Wᵀ (q − p n) = 0             equilibrium at free degrees of freedom
     (2)  p = max(0, λ_n − ε g)                                              pressure (Alart & Curnier 1991)
     (3)  q* = λ_t − ε s;  q = q* if |q*| ≤ μ p (stick), else μ p q*/|q*|    return mapping (Simo & Laursen 1992)
     (4)  (K + Σ_a A Wᵀ H W + E) Δu = R,   H = ε n nᵀ + H_t                  Newton step
-    (5)  λ_n ← p,  λ_t ← q, both as (2), (3) are at u + Δu to first order   multiplier update (Uzawa's, every step)
-    (6)  |R| ≤ tolerance · scale,  −g ≤ penetration · edge,  Σ A |Δλ| ≤ 0.002 Σ A |λ|           when it has converged
+    (5)  λ_n ← p,  λ_t ← q, by (2), (3) linearised at u, evaluated at u+Δu  multiplier update (Uzawa, every iteration)
+    (6)  |R| ≤ tolerance · scale,  −g ≤ penetration · edge,  Σ A |Δλ| ≤ 0.002 Σ A |λ|           convergence
 
-K is the bodies' tangent, H_t = ε (I − n nᵀ) where a point sticks and what resists its path's turning where it slides.
-K + H is symmetric and, ε being moderate (200 E*/edge), well conditioned, and (5) takes away what overlap and slip a
-penalty leaves. It is factorised (``solver.factor``: multifrontal Cholesky); where that costs too much, or K + H is not
-positive definite, multigrid preconditions instead. E is what is not symmetric: derivatives of mortar weights and
-normals (Puso & Laursen 2004), and of friction by pressure; with it GMRES takes over, preconditioned by K + H.
+K is the tangent of the bodies; H_t = ε (I − n nᵀ) at sticking points, and at sliding points the resistance to turning
+of the slip direction. K + Σ A Wᵀ H W (below: K + H) is symmetric and, as ε is moderate (200 E*/edge), well conditioned;
+(5) removes the penetration and elastic slip that a penalty leaves. It is factorised by multifrontal Cholesky
+(``fem.solver.factor``); if that costs too much, or K + H is not positive definite, a multigrid preconditioner is used.
+E is the non-symmetric part of the tangent: derivatives of mortar weights and normals (Puso & Laursen 2004), and of
+friction with respect to pressure; with it (4) is solved by GMRES preconditioned by K + H.
 
-A load step (``load_steps``, ``contact_newton``), from u and λ of the step before, at the guess that leaves the least
-force over (u carried along by what moves the bodies, alone or with last step's correction), or, where that is in vain,
-from u itself, prescribed values yet to go to their place:
+A load step (``load_steps``, ``contact_newton``) starts from u and λ of the previous step, at the predictor with the
+smallest residual (u carried along by the moving boundary conditions, with or without the last step's correction); if
+that fails, at u itself, with the Dirichlet values applied in the first Newton step. Iterations:
 
-1. ``newton_state.assemble``: R of (1); end where (6) holds and points found afresh agree (``balanced``, ``confirmed``).
-2. ``newton_state.linearise``, ``tangent``: E; ``lagged_solver``: Δu of (4); where K + H is not positive definite
-   ``damping`` lends it stiffness at rest (Levenberg, Marquardt). A body that nothing is prescribed of is held back by
-   a little stiffness until contact resists all its motions (``unconstrained.grasped``), and not after that.
-   A search that never comes near (|R| above .3 of the forces for ten iterations; .05 for twenty where bodies are
-   held by contact alone) is ended.
-3. How far along Δu (``contact_newton``): as far as points look ahead; elements keep a fifth of their Jacobians
-   (``line_search.length_upright``); see 5 for the rest.
-4. ``newton_state.advance``: λ by (5); contact points anew; forces by (2), (3).
-   *Fixed-point phase*, iterations 1–8: full steps, λ after each of them, and the active set frozen for a solve: what
-   has λ_n > 0 presses in (2) whatever its gap, the solve says whether it lets go (primal–dual active set: Hüeber &
-   Wohlmuth 2005); the last solve's λ_n bounds friction in (3), so that each solve is a convex problem (Tresca's).
-5. *Alternating phase*, after that: λ is updated only when no point came or went; a line search along Δu settles what
-   does (work, or residual where E counts).
-   In either phase friction follows the present pressure (coupled) once the same points touch, slide and stick in turn
-   after turn: Tresca's bound, taken from the solve before, leaves up to .7 of the error each time. Where points that
-   stick come and go by it, the bound is taken from the solve before again.
-   A search whose points, found afresh, do not agree goes on in this phase, twice at most.
-6. Bonds whose traction is too much are broken, and the step is found again; a step that fails is taken in halves.
+1. ``newton_state.assemble``: R of (1). The step ends when (6) holds and contact points searched again agree
+   (``balanced``, ``confirmed``).
+2. ``newton_state.linearise``, ``tangent``: E; ``lagged_solver``: Δu of (4). If K + H is not positive definite,
+   ``damping`` adds a fraction of the stiffness at rest (Levenberg–Marquardt). A body without Dirichlet conditions gets
+   a small artificial stiffness until contact resists all its rigid motions (``unconstrained.grasped``).
+   A search that does not come near (|R| above 0.3 of the forces for 10 iterations; 0.05 for 20 if bodies are held by
+   contact alone) is abandoned.
+3. Step length along Δu (``contact_newton``): limited by the search distance of contact, and such that elements keep a
+   fifth of their Jacobian determinants (``line_search.length_upright``); in the alternating phase also by 5.
+4. ``newton_state.advance``: λ by (5); contact points searched again; forces by (2), (3).
+   *Fixed-point phase*, iterations 1–8: full steps, λ updated after each, and the active set frozen during a solve:
+   points with λ_n > 0 are active in (2) whatever their gap, and the solve decides whether they open (primal–dual active
+   set strategy: Hüeber & Wohlmuth 2005). λ_n of the previous solve bounds friction in (3), so that each solve is a
+   convex problem (Tresca friction).
+5. *Alternating phase*, afterwards: λ is updated only if the active set did not change; otherwise a line search along Δu
+   (by work, or by the residual if E is present) settles the active set.
+   In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points
+   touch, slide and stick in successive iterations, as iterating over Tresca bounds leaves up to 0.7 of the error each
+   time. If sticking points change because of that, the bound is taken from the previous solve again.
+   A search whose contact points, searched again, do not agree continues in this phase, at most twice.
+6. Bonds whose traction exceeds their strength are broken and the step is solved again; a step that fails is halved.
 
-``contact_system`` has (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` has f_int, f_ext and K;
-``unconstrained`` steadies bodies that only contact holds, and says why none was found: falls, slides, or is blocked;
-``statics`` proves that friction cannot hold a body before that is said. ``passing`` cuts steps longer than contact can
-follow (``course`` says where bodies are going) and finds nodes deep in another body, ``first_touch`` when in a step
-friction takes hold of what was apart.
+``contact_system`` evaluates (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` f_int, f_ext and K.
+``unconstrained`` stabilises bodies held by contact alone, and explains a failure: unheld, sliding or blocked;
+``statics`` proves that friction cannot hold a body before that is reported. ``passing`` cuts steps longer than contact
+search can follow (``course`` predicts the motion) and finds nodes deep inside another body; ``first_touch`` finds when
+in a step frictional contact begins.
 
 - P. Alart, A. Curnier 1991, A mixed formulation for frictional contact problems prone to Newton like solution methods,
   Comput. Methods Appl. Mech. Eng. 92, 353–375.

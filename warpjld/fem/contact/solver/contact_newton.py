@@ -1,4 +1,4 @@
-"""Newton's method for one load step, on bodies and contact together (see ``contact.solver`` for the algorithm)."""
+"""Newton's method for one load step, bodies and contact together (algorithm: ``contact.solver``)."""
 
 from __future__ import annotations
 
@@ -25,37 +25,38 @@ from warpjld.fem.solver.krylov import Iteration, SolveStatus
 __all__ = ["ContactNewton"]
 
 _ITERATIONS = 40
+"""Most Newton iterations of a search."""
 _PENALTY = 200.0
-"""Contact stiffness over E* by the edge of a face: more makes the linear solves slow, less makes them many."""
+"""Penalty ε times edge over E*: a larger one makes linear solves slower, a smaller one makes more of them necessary."""
 _STRIDE = 0.25
-"""Farthest a node moves in an iteration where something presses, over what points look ahead (two edges)."""
+"""Largest displacement of a node in an iteration with active contact, over the search distance (two edges)."""
 _FALLS = 8
-"""Iterations in a row that an unconstrained body may fall for, with nothing touching it."""
+"""Most successive iterations in which an unconstrained body may have no contact."""
 _RESTARTS = 2
-"""Times that a search may go on with points found afresh: one that comes to the same place again goes round."""
+"""Most continuations of a search after contact points searched again did not agree; more of them cycle."""
 _HOPELESS, _FAR = 10, 0.3
-"""A search is ended at that iteration if what is left over was never below this share of the forces that balance. Of
-225 searches of grasps that converged none would have been; of 1,615 iterations in vain 381 were saved. Not where bodies
-are held by contact alone: forces on them are slight, and balance last, as long as they find their place."""
+"""Iteration at which a search is abandoned if its relative residual was never below the second number. Of 225 converged
+searches in grasps none would have been abandoned; 381 of 1,615 futile iterations were saved. Not used for bodies held
+by contact alone: forces on them are small, and balance last."""
 _LOST, _NEAR = 20, 0.05
-"""The same of those: what has not come near by then seldom does, and a shorter step is found in fewer."""
+"""The same for bodies held by contact alone; searches beyond that seldom converge, and shorter steps take fewer."""
 
 
 class ContactNewton:
-    """The bodies and interfaces of a contact problem, and the matrices kept between steps.
+    """Newton solver of a contact problem; keeps matrices and preconditioners between load steps.
 
     Args:
         body: All bodies, merged.
-        interfaces: What may touch.
-        moduli: E* at each interface's slave nodes [Pa].
+        interfaces: Contact interfaces.
+        moduli: Contact modulus E* at each interface's slave nodes [Pa].
         tolerance: Relative residual.
-        penetration: Overlap left, as a share of an edge.
+        penetration: Admissible penetration, relative to an element edge.
 
     Attributes:
-        solves: Linear solves so far.
-        iterations: Their iterations.
-        most: Iterations of a search at most.
-        failure: Why no equilibrium was found, where that is known.
+        solves: Number of linear solves so far.
+        iterations: Number of their iterations.
+        most: Most Newton iterations of a search.
+        failure: Reason why no equilibrium was found; empty if not known.
     """
 
     def __init__(
@@ -74,10 +75,10 @@ class ContactNewton:
     def find(
         self, u: Array, states: list[ContactState], step: LoadStep, *guesses: Array
     ) -> tuple[SolveStatus, Equilibrium | None]:
-        """Equilibrium from displacement u (3N,) at ``step.before``.
+        """Equilibrium of a load step from displacement u (3N,) and contact states at ``step.before``.
 
-        It is looked for from the guess that turns no element inside out and leaves the least force over; where that is
-        in vain, and where there is none, from u, what is prescribed yet to go to its place.
+        The search starts from the guess with the smallest residual among those without inverted elements; if it fails
+        or there is none, from u, with the Dirichlet values applied in the first Newton step.
         """
         begun = [
             NewtonState(self._elastic, self._system, step, u, states, guess, **self._accuracy)
@@ -86,7 +87,7 @@ class ContactNewton:
         ]
         begun.sort(key=NewtonState.left_over)
         status, found = SolveStatus.MAX_ITERATIONS, None
-        # where nothing prescribed moves, and nothing else is known, both searches are the same
+        # a guess equal to u, with its Dirichlet values, would repeat the same search
         same = bool(begun) and np.array_equal(begun[0].u, u)
         if begun:
             status, found = self._search(begun[0], step)
@@ -98,7 +99,7 @@ class ContactNewton:
         return status, found
 
     def _search(self, state: NewtonState, step: LoadStep) -> tuple[SolveStatus, Equilibrium | None]:
-        """Equilibrium from where a state is."""
+        """Newton iterations from a state (steps 1–5 of the algorithm)."""
         unconstrained = self._unconstrained(step.prescribed)
         self._solver.begin()
         self._damping.begin()
@@ -134,9 +135,9 @@ class ContactNewton:
         return status, None
 
     def _solved(self, state: NewtonState, unconstrained: UnconstrainedBodies) -> Iteration:
-        """A Newton step's free displacements; damped as far as the matrix needs it to be positive definite.
+        """Free displacements of a Newton step, with as much damping as a positive definite matrix needs.
 
-        Bodies that contact alone holds are steadied where it does not resist all their motions, or hardly.
+        Bodies held by contact alone are stabilised as long as contact does not resist all their rigid motions.
         """
         if unconstrained and self._damping.share == 0.0 and unconstrained.grasped(state.contact):
             done = self._solved_with(state, lambda matrix: matrix)
@@ -148,7 +149,7 @@ class ContactNewton:
                 return done
 
     def _solved_with(self, state: NewtonState, steadied: Callable[[BlockMatrix], BlockMatrix]) -> Iteration:
-        """A Newton step's free displacements, as damped as it is, with a matrix that is ``steadied``."""
+        """Free displacements of a Newton step with the current damping and a function that stabilises the matrix."""
         contact, stiffness = state.contact, state.tangent.stiffness
         assert stiffness is not None
         blocks = [t.blocks for t in contact.tractions]
@@ -166,7 +167,7 @@ class ContactNewton:
         return done
 
     def _advance(self, state: NewtonState, move: Array, unconstrained: UnconstrainedBodies) -> float:
-        """Go along a Newton step (3N,) as far as it serves: the share of it that was gone."""
+        """Advance along a Newton step (3N,) by the step length found; returns that length, 0 … 1."""
         stride = self._stride(state, move, unconstrained)
         move *= stride
         length = self._length(state, move, unconstrained)
@@ -177,7 +178,8 @@ class ContactNewton:
         return length
 
     def _stride(self, state: NewtonState, move: Array, unconstrained: UnconstrainedBodies) -> float:
-        """Share of a move (3N,) that points can see ahead; all of it on the way to what is prescribed."""
+        """Fraction of a Newton step (3N,) allowed by the search distance of contact; 1 until Dirichlet values are
+        reached."""
         if not state.arrived:
             return 1.0
         reach = self._system.reach
@@ -187,7 +189,7 @@ class ContactNewton:
         return stride
 
     def _length(self, state: NewtonState, move: Array, unconstrained: UnconstrainedBodies) -> float:
-        """How far to go along a move (3N,), 1 for all of it; 0 where elements turn inside out however short it is."""
+        """Step length along a move (3N,), 0 … 1; 0 if elements invert however short it is."""
         length = length_upright(self._elastic, state.u, move, state.tangent.lowest)
         if length == 0.0:
             return 0.0

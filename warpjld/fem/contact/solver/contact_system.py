@@ -29,15 +29,15 @@ __all__ = [
 ]
 
 GRAZING = 0.02
-"""Edges by which sides that are both prescribed may overlap: more is said, and less is as if they touched."""
+"""Overlap of two prescribed sides, in element edges, that counts as touching; more is reported as blocked."""
 IMMOBILE = 1e-9
-"""Share of a point's weights that must be free to move along its normal for it to be parted."""
+"""Mobility (see ``mobility``) below which a point counts as prescribed along its normal."""
 _SETTLED = 2e-3
-"""Share of the contact forces by which the multipliers may still change."""
+"""Convergence tolerance of the multipliers: change relative to the contact forces, (6) of ``contact.solver``."""
 _SLOW = 0.1
-"""Share of the overlap that a linear solve may leave; where it leaves more, the penalty grows,"""
+"""Fraction of the penetration remaining after a linear solve above which the penalty of a site is raised."""
 _STIFFER, _STIFFEST = 5.0, 3125.0
-"""by the one factor, up to the other."""
+"""Factor by which a penalty is raised, and largest total factor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +45,11 @@ class LoadStep:
     """A load step.
 
     Attributes:
-        before: Time it starts from.
-        time: Time it goes to.
-        prescribed: Displacements at ``time``.
+        before: Time at its start.
+        time: Time at its end.
+        prescribed: Dirichlet conditions at ``time``.
         loads: Loads at ``time``.
-        allowed: Share of the overlap at the start that is still allowed at ``time``.
+        allowed: Fraction of the initial overlap that is still admissible at ``time``.
     """
 
     before: float
@@ -61,12 +61,16 @@ class LoadStep:
 
 @dataclass(frozen=True, eq=False)
 class ContactForces:
-    """Every interface's points, slips [m] and tractions, and their nodal forces together [N], shape (3N,).
+    """Contact forces at a configuration.
 
     Attributes:
-        coupled: Whether friction follows the pressure as it is, and not the multipliers'.
-        nonsymmetric: What a symmetric stiffness leaves out [N/m], ``csr_array`` (3N, 3N); None where nothing is or it
-            was not asked for (``ContactSystem.linearise``).
+        points: Contact points of each interface.
+        slips: Slips of the points of each interface since the start of the step [m], shape (m, 3).
+        tractions: Tractions of each interface.
+        forces: Nodal forces of all interfaces [N], shape (3N,).
+        coupled: Whether friction is bounded by the current pressure (Coulomb) instead of the multiplier (Tresca).
+        nonsymmetric: Non-symmetric part E of the tangent [N/m], ``csr_array`` (3N, 3N); None if it vanishes or was not
+            computed (``ContactSystem.linearise``).
     """
 
     points: list[ContactPoints]
@@ -78,14 +82,14 @@ class ContactForces:
 
 
 class ContactSystem:
-    """Interfaces between bodies.
+    """Contact contributions of all interfaces to forces, tangent and multipliers.
 
     Args:
         nodes: Rest positions of the bodies' nodes [m], shape (N, 3).
-        interfaces: What may touch.
-        moduli: E* at each interface's slave nodes [Pa].
-        penalty: Contact stiffness over E* by the edge of a face.
-        penetration: Overlap left, as a share of an edge.
+        interfaces: Contact interfaces.
+        moduli: Contact modulus E* at each interface's slave nodes [Pa].
+        penalty: Penalty ε times edge over E*.
+        penetration: Admissible penetration, relative to an element edge.
     """
 
     def __init__(
@@ -98,34 +102,33 @@ class ContactSystem:
 
     @property
     def reach(self) -> float:
-        """How far ahead the least far-sighted interface looks [m]."""
+        """Smallest search distance of all interfaces [m]."""
         return min(interface.reach for interface in self.interfaces)
 
     def normals(self, u: Array) -> list[Array]:
-        """Of every interface's slave nodes at displacement u (3N,)."""
+        """Normals of every interface's slave nodes at displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
         return [interface.slave.normals(x) for interface in self.interfaces]
 
     def turned(self, normals: list[Array], u: Array, every: bool) -> list[Array]:
-        """Normals at displacement u (3N,): of surfaces that meet surfaces, or of every one; the others stay."""
+        """Normals updated to displacement u (3N,): of all interfaces, or of deformable unbonded ones only."""
         fresh = zip(self.interfaces, normals, self.normals(u), strict=True)
         return [new if every or interface.slides else old for interface, old, new in fresh]
 
     def points(self, u: Array, step: LoadStep, normals: list[Array]) -> list[ContactPoints]:
-        """Every interface's points at displacement u (3N,)."""
+        """Contact points of every interface at displacement u (3N,)."""
         x = self._rest + u.reshape(-1, 3)
         found = [i.points(x, step.before, step.time, n) for i, n in zip(self.interfaces, normals, strict=True)]
-        return self._parted(found, step)
+        return self._without_grazing(found, step)
 
     def refreshed(self, points: list[ContactPoints], u: Array, step: LoadStep) -> list[ContactPoints]:
-        """Points between surfaces as displacement u (3N,) has them, since their derivatives are known; others stay."""
+        """Points searched again at displacement u (3N,) where the tangent has their derivatives; others unchanged."""
         x = self._rest + u.reshape(-1, 3)
         known = zip(self.interfaces, points, strict=True)
-        return self._parted([i.points(x, step.before, step.time) if i.slides else p for i, p in known], step)
+        return self._without_grazing([i.points(x, step.before, step.time) if i.slides else p for i, p in known], step)
 
-    def _parted(self, points: list[ContactPoints], step: LoadStep) -> list[ContactPoints]:
-        """Points with what is prescribed on both sides touching, not overlapping, where it does so slightly: no force
-        can part it, and none is meant."""
+    def _without_grazing(self, points: list[ContactPoints], step: LoadStep) -> list[ContactPoints]:
+        """Points with slight overlaps of two prescribed sides set to gap 0, as no force could separate them."""
         free = step.prescribed.free(self._rest.size)
         out = list(points)
         for k, (interface, p) in enumerate(zip(self.interfaces, points, strict=True)):
@@ -145,7 +148,7 @@ class ContactSystem:
         *,
         coupled: bool = False,
     ) -> ContactForces:
-        """Contact forces at points when bodies have moved (3N,) since the start of the step."""
+        """Contact forces at points, after a displacement ``moved`` (3N,) since the start of the step."""
         slips = [p.relative(moved.reshape(-1, 3)) - p.carried for p in points]
         tractions = self._tractions(points, slips, states, allowed, decides, coupled)
         return ContactForces(points, slips, tractions, self.nodal(points, tractions), coupled)
@@ -153,10 +156,9 @@ class ContactSystem:
     def predicted(
         self, contact: ContactForces, states: list[ContactState], move: Array, allowed: float, decides: ActiveSet
     ) -> list[ContactTractions]:
-        """Tractions after a move (3N,), by the linear model: the multipliers to go on with."""
+        """Tractions after a move (3N,) by the linearised contact kinematics; the next multipliers."""
         slips = self._slips(contact, move)
         points = [shifted(p, move.reshape(-1, 3)) for p in contact.points]
-        # penalties and sites are those of the points before
         return self._tractions(points, slips, states, allowed, decides, contact.coupled)
 
     def _tractions(
@@ -178,7 +180,7 @@ class ContactSystem:
         return [s + p.relative(move.reshape(-1, 3)) for s, p in zip(contact.slips, contact.points, strict=True)]
 
     def nodal(self, points: list[ContactPoints], tractions: list[ContactTractions]) -> Array:
-        """Nodal forces of all interfaces together [N], shape (3N,)."""
+        """Nodal forces of all interfaces [N], shape (3N,)."""
         total = np.zeros_like(self._rest)
         for p, t in zip(points, tractions, strict=True):
             total += p.forces(t.traction(p))
@@ -187,9 +189,9 @@ class ContactSystem:
     def linearise(
         self, contact: ContactForces, states: list[ContactState], pressed: list[ContactState], u: Array
     ) -> ContactForces:
-        """With what a symmetric stiffness leaves out, where points are those of displacement u (3N,).
+        """Contact forces with the non-symmetric part of the tangent added, for points at displacement u (3N,).
 
-        ``pressed`` knows the multipliers that directions turn with; ``states`` are the present ones.
+        ``states`` are the current contact states; ``pressed`` those whose multipliers turn with the normals.
         """
         x = self._rest + u.reshape(-1, 3)
         points, parts = list(contact.points), []
@@ -213,7 +215,7 @@ class ContactSystem:
         move: Array,
         decides: ActiveSet,
     ) -> list[ContactState]:
-        """States after a move (3N,) that was predicted to be answered so."""
+        """Contact states after a move (3N,) with predicted tractions (multiplier update)."""
         out = []
         for k, (slip, s, p, t) in enumerate(
             zip(self._slips(contact, move), states, contact.points, predicted, strict=True)
@@ -231,7 +233,7 @@ class ContactSystem:
         before: ContactTractions,
         predicted: ContactTractions,
     ) -> Array:
-        """Penalties raised where flesh is so stiff that multipliers would find their values slowly, shape (s,)."""
+        """Penalty factors, raised where multipliers converge slowly because the bodies are stiff, shape (s,)."""
         at = points.sites
         seen = before.active & predicted.active & (before.error > self._penetration * self.interfaces[k].edge[at])
         slow = at[seen & (predicted.error > _SLOW * before.error)]
@@ -240,11 +242,11 @@ class ContactSystem:
         return out
 
     def _penalty(self, k: int, points: ContactPoints, state: ContactState) -> Array:
-        """ε of points [Pa/m]."""
+        """Penalty ε of points [Pa/m]."""
         return np.asarray((self._penalties[k] * state.stiffening)[points.sites])
 
     def begun(self, states: list[ContactState], start: Array, time: float) -> list[ContactState]:
-        """States that know what is apart as the step begins, where friction asks for it."""
+        """States with ``open_before`` set for the start of a step, on interfaces with friction."""
         x = self._rest + start.reshape(-1, 3)
         out = []
         for interface, s in zip(self.interfaces, states, strict=True):
@@ -257,7 +259,8 @@ class ContactSystem:
         return out
 
     def settled(self, contact: ContactForces, states: list[ContactState], negligible: float) -> bool:
-        """Whether multipliers stay: overlap is gone, and forces change by little, or by what is ``negligible``."""
+        """Whether the multipliers have converged: penetration is admissible, and forces change by less than the
+        tolerance, or than ``negligible`` [N]."""
         for k, (p, t, s) in enumerate(zip(contact.points, contact.tractions, states, strict=True)):
             if not t.active.any():
                 continue
@@ -272,32 +275,33 @@ class ContactSystem:
     def mismatch(
         self, fresh: list[ContactPoints], points: list[ContactPoints], tractions: list[ContactTractions]
     ) -> float:
-        """How far gaps as they are differ from those believed, where surfaces press or overlap, over an edge."""
+        """Largest difference between gaps searched again and those used, at active or overlapping points, in element
+        edges."""
         worst = 0.0
         for interface, p, t, q in zip(self.interfaces, points, tractions, fresh, strict=True):
             edge = interface.edge
             active = np.zeros(len(edge), dtype=bool)
             active[p.sites] = t.active
-            believed = np.full(len(edge), np.inf)
-            believed[p.sites] = p.gap
-            off = np.abs(q.gap - believed[q.sites])
+            used = np.full(len(edge), np.inf)
+            used[p.sites] = p.gap
+            off = np.abs(q.gap - used[q.sites])
             off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
             worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
 
 
 def mobility(points: ContactPoints, free: Mask) -> Array:
-    """Share of each point's weights that may move along its normal, of free degrees of freedom (3N,), shape (m,)."""
+    """Mobility of points: share of their weights at free degrees of freedom (3N,) along the normal, shape (m,)."""
     return np.asarray(np.einsum("mi,mi->m", abs(points.weights) @ free.reshape(-1, 3).astype(float), points.normal**2))
 
 
 def shifted(points: ContactPoints, move: Array) -> ContactPoints:
-    """Points after a move (N, 3), by the linear model: their normals and weights stay."""
+    """Points after a move (N, 3) by linearised kinematics: gaps change, normals and weights do not."""
     return replace(points, gap=points.gap + points.opened(move)) if move.any() else points
 
 
 def same_active_set(tractions: list[ContactTractions], others: list[ContactTractions]) -> bool:
-    """Whether the same points touch, and stick, in both."""
+    """Whether the same points are active, and sticking, in both."""
     return all(
         np.array_equal(t.active, o.active) and np.array_equal(t.sticking, o.sticking)
         for t, o in zip(tractions, others, strict=True)

@@ -1,4 +1,4 @@
-"""Where bodies are going in a load step, before contact has its say."""
+"""Predicted motion of bodies in a load step without contact, extrapolated from prescribed nodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Course"]
 
 
 class Course:
-    """Prescribed displacements carried on to the nodes that are free, each as the nearest prescribed one of its body.
+    """Extrapolation of prescribed displacements: free nodes move like the nearest prescribed node of their body.
 
     Args:
         body: All bodies, merged.
@@ -26,24 +26,24 @@ class Course:
         self._nearest: tuple[bytes, list[tuple[Ints, Ints]]] | None = None
 
     def adrift(self, prescribed: Prescribed) -> bool:
-        """Whether prescribed displacements leave a body free to move as a whole."""
+        """Whether the Dirichlet conditions leave a body free to move rigidly."""
         key = prescribed.degrees.tobytes()
         if self._adrift is None or self._adrift[0] != key:
             self._adrift = (key, bool(free_motions(self._body, prescribed)))
         return self._adrift[1]
 
     def ahead(self, u: Array, prescribed: Prescribed) -> Array:
-        """The displacement (3N,) that prescribed ones ask for, from displacement u (3N,): what has none stays."""
+        """Predicted displacement (3N,) from displacement u (3N,); bodies without Dirichlet conditions do not move."""
         out = u.reshape(-1, 3).copy()
-        wanted = np.zeros(u.size)
-        wanted[prescribed.degrees] = prescribed.values - u[prescribed.degrees]
-        step = wanted.reshape(-1, 3)
+        change = np.zeros(u.size)
+        change[prescribed.degrees] = prescribed.values - u[prescribed.degrees]
+        step = change.reshape(-1, 3)
         for axis, (to, nearest) in enumerate(self._table(prescribed)):
             out[to, axis] += step[nearest, axis]
         return out.reshape(-1)
 
     def _table(self, prescribed: Prescribed) -> list[tuple[Ints, Ints]]:
-        """For each axis nodes, and the prescribed node that each follows."""
+        """For each axis: nodes, and the prescribed node that each follows."""
         from scipy.spatial import cKDTree
 
         key = prescribed.degrees.tobytes()
@@ -57,7 +57,7 @@ class Course:
                     mine, known = np.flatnonzero(self._piece == number), given[self._piece[given] == number]
                     to.append(mine)
                     nearest.append(known[cKDTree(self._nodes[known]).query(self._nodes[mine])[1]])
-                nothing: list[Ints] = [np.empty(0, np.int64)]
-                table.append((np.concatenate(to or nothing), np.concatenate(nearest or nothing)))
+                empty: list[Ints] = [np.empty(0, np.int64)]
+                table.append((np.concatenate(to or empty), np.concatenate(nearest or empty)))
             self._nearest = (key, table)
         return self._nearest[1]

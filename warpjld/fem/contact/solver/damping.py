@@ -1,9 +1,8 @@
 """Levenberg–Marquardt damping of Newton steps, in the metric of the stiffness at rest.
 
-Flesh that folds in a crease has a tangent that is nearly singular there, or not positive definite, on the way to its
-fold. A share of the stiffness at rest is then lent to the matrix, not to the forces: it holds back what deforms without
-resistance and hardly what moves as a whole, and where the steps lead is not changed (Levenberg 1944, Marquardt 1963,
-with the metric of the elements).
+Where flesh folds in a crease, its tangent is nearly singular or not positive definite on the way. A fraction of the
+stiffness at rest is then added to the matrix, but not to the forces: it restrains deformation without resistance and
+hardly any rigid motion, and does not change the solution (Levenberg 1944, Marquardt 1963).
 """
 
 from __future__ import annotations
@@ -15,16 +14,21 @@ from warpjld.fem.body import Body
 __all__ = ["Damping"]
 
 _FIRST, _MORE, _MOST = 0.05, 4.0, 4.0
+"""First damping (fraction of the stiffness at rest), factor by which it is raised, and largest value."""
 _LESS = 3.0
+"""Divisor by which it is reduced after a full step."""
 _SHORT = 0.5
-"""Steps shorter than this share were too long."""
+"""Step length below which it is raised."""
 
 
 class Damping:
-    """The share of a body's stiffness at rest that is lent to its tangent.
+    """Fraction of the bodies' stiffness at rest that is added to their tangent.
 
     Args:
         body: All bodies, merged.
+
+    Attributes:
+        share: The fraction; 0 without damping.
     """
 
     def __init__(self, body: Body) -> None:
@@ -33,11 +37,11 @@ class Damping:
         self.share = 0.0
 
     def begin(self) -> None:
-        """A new step: none is lent."""
+        """Start a load step without damping."""
         self.share = 0.0
 
     def lend(self, stiffness: BlockMatrix) -> BlockMatrix:
-        """The tangent with what is lent to it, in a new matrix if there is any."""
+        """The damped tangent; a new matrix if there is damping."""
         if self.share == 0.0:
             return stiffness
         if self._rest is None:
@@ -47,12 +51,12 @@ class Damping:
         return BlockMatrix(stiffness.rows, stiffness.columns, stiffness.values + self.share * self._rest)
 
     def more(self) -> bool:
-        """Lend more; False where that would no longer be help."""
+        """Raise the damping; False if it exceeds the largest value."""
         self.share = max(_FIRST, _MORE * self.share)
         return self.share <= _MOST
 
     def judge(self, length: float) -> None:
-        """Lend more after a step of which only a short part (0 … 1) was gone, less after a whole one."""
+        """Adapt the damping to the length (0 … 1) of the last step: more after a short step, less after a full one."""
         if length < _SHORT:
             self.share = min(max(_FIRST, _MORE * self.share), _MOST)
         elif length == 1.0:

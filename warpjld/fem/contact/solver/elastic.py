@@ -1,4 +1,4 @@
-"""Bodies without their contact: internal and external forces, and tangent stiffness."""
+"""Forces and tangent stiffness of the bodies without contact, with buffers reused between evaluations."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ __all__ = ["Elastic"]
 
 
 class Elastic:
-    """Bodies whose stiffness at small strain is found once, and otherwise anew, in the same memory.
+    """Internal forces, external forces and tangent of bodies; with linear laws the stiffness is assembled only once.
 
     Args:
         body: All bodies, merged.
+
+    Attributes:
+        body: As given.
+        linear: Whether all laws are linear.
+        stiffness: Mean diagonal stiffness of each node at rest [N/m], shape (N,).
     """
 
     def __init__(self, body: Body) -> None:
@@ -29,14 +34,13 @@ class Elastic:
         self._dead: tuple[Loads, Array] | None = None
         assert self._rest.stiffness is not None
         self.stiffness: Array = np.einsum("nii->n", self._rest.stiffness.diagonal()) / 3.0
-        """Of each node at rest [N/m], shape (N,)."""
         if not self.linear:
             self._last = self._rest
 
     def at(self, u: Array, pressures: Array | None, loads: Loads) -> Tangent:
-        """Stiffness, that of following pressure taken off, and internal forces at displacement u (3N,).
+        """Tangent stiffness, minus that of follower pressure, and internal forces at displacement u (3N,).
 
-        ``pressures`` (E,) are those that K takes for its own. The matrix is good until the next call.
+        ``pressures`` (E,) [Pa] replace the elements' own in the stiffness. The matrix is valid until the next call.
         """
         if self.linear:
             return self.forces(u)
@@ -46,7 +50,7 @@ class Elastic:
         return self._last
 
     def forces(self, u: Array) -> Tangent:
-        """Internal forces alone; line searches ask for the same place in turn, so the last is kept."""
+        """Internal forces at displacement u (3N,); the last result is cached, as line searches repeat it."""
         if not self.linear:
             if self._there is None or not np.array_equal(u, self._there[0]):
                 self._there = u.copy(), self.body.at(u, stiffness=False)
@@ -56,7 +60,7 @@ class Elastic:
         return replace(self._rest, forces=self._rest.forces + own)
 
     def external(self, loads: Loads, u: Array) -> Array:
-        """Nodal forces of loads [N], shape (3N,); as the displaced body meets them at large strain."""
+        """Nodal forces of loads [N], shape (3N,); follower loads at displacement u with large strain."""
         if not self.linear and loads.follows:
             return external_forces(self.body, loads, u)
         if self._dead is None or self._dead[0] is not loads:
@@ -64,10 +68,10 @@ class Elastic:
         return self._dead[1]
 
     def pressures(self, u: Array, move: Array | None = None) -> Array | None:
-        """Pressure of each element [Pa], shape (E,), as foreseen after a move (3N,); None at small strain."""
+        """Pressure of each element [Pa], shape (E,), predicted after a move (3N,); None with linear laws."""
         return None if self.linear else self.body.at(u, stiffness=False, increment=move).pressures
 
     def upright(self, u: Array, least: Array | float = 0.0) -> bool:
-        """Whether the elements' Jacobian determinants are above ``least`` (E,) at displacement u (3N,); at small strain
-        they are."""
+        """Whether the elements' Jacobian determinants exceed ``least`` (E,) at displacement u (3N,); True with linear
+        laws."""
         return self.linear or bool((self.forces(u).lowest > least).all())

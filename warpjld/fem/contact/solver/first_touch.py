@@ -1,8 +1,8 @@
-"""When in a load step what was apart comes to touch: from there on friction resists what it slides.
+"""Time of first contact within a load step, from which on friction resists sliding.
 
-In a step in which a body comes down by w, of which a gap g is the first part, and is dragged along by s, it slides
-freely by s g / w and with friction by the rest. How far it comes down if nothing is in its way is known of what is
-prescribed; what loads press down is followed in steps so short that it hardly slides before it touches.
+If a body approaches by w in a step, of which the gap g is the first part, and moves tangentially by s, it slides freely
+by s g / w and with friction for the rest. The approach of bodies with prescribed motion is known in advance; for bodies
+moved by loads, steps are made so short that they hardly slide before they touch.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ from warpjld.fem.contact.solver.newton_state import Equilibrium
 __all__ = ["first_touch", "slid_unheld", "touched_at"]
 
 _SLID = 0.02
-"""Edges that something may slide in the step in which it comes to touch, if it is not known when it does."""
+"""Largest tangential motion, in element edges, in a step in which contact begins at an unknown time."""
 _HALF, _FAR = 0.5, 0.25
-"""Share of a step taken for one that is not known; used where a site is dragged by more edges than this, or else what
-touches beside others takes hold at the end of the step: flesh that is pressed slips a little everywhere."""
+"""Fraction of the step assumed for an unknown time of first contact on an interface that is in contact already, for
+sites that move tangentially by more than the second number of edges; other sites stick from the end of the step on, as
+pressed flesh slips a little everywhere."""
 _PAST = 1e-3
-"""Share of a step by which it is cut behind the first touch: what touches then presses."""
+"""Fraction of a step by which it extends beyond the first contact when cut, so that there is pressure."""
 _LAST = 1.0 - 1e-9
-"""Latest share of a step that is known: 1 is not."""
+"""Largest known fraction; 1 means unknown."""
 _APPROACH = 1e-9
-"""Way towards the other side that is none, over an edge."""
+"""Approach, in element edges, below which two sides count as not approaching."""
 
 
 def touched_at(
@@ -42,22 +43,23 @@ def touched_at(
     ahead: Array,
     step: LoadStep,
 ) -> list[ContactState]:
-    """States that know when in a step each site comes to touch.
+    """Contact states with ``touched_at`` set: the fraction of the step after which each site touches.
 
     Args:
-        interfaces, states: What may touch, and what is known of it.
+        interfaces: Contact interfaces.
+        states: Their states.
         nodes: Rest positions of the bodies' nodes [m], shape (N, 3).
-        u: Displacement where the step begins [m], shape (3N,).
-        ahead: Displacement at its end if nothing is in the way, likewise.
-        step: The step.
+        u: Displacement at the start of the step [m], shape (3N,).
+        ahead: Predicted displacement at its end without contact [m], shape (3N,).
+        step: The load step.
     """
-    way = (ahead - u).reshape(-1, 3)
+    move = (ahead - u).reshape(-1, 3)
     x = nodes + ahead.reshape(-1, 3)
     out = []
     for interface, state in zip(interfaces, states, strict=True):
         if interface.pair.friction > 0.0:
             points = interface.points(x, step.before, step.time)
-            past = points.relative(way) - points.carried
+            past = points.relative(move) - points.carried
             towards = np.einsum("mi,mi->m", points.normal, past)
             edge, began = interface.edge[points.sites], bool((state.pressure > 0.0).any())
             known = towards > _APPROACH * edge
@@ -81,29 +83,30 @@ def first_touch(
     ahead: Array,
     step: LoadStep,
 ) -> float:
-    """Share of a step after which two sides with friction, apart when it begins, first touch; 1 where none do, or where
-    they do not slide from there on. Arguments as in ``touched_at``, whose states these are.
+    """Fraction of a step after which two separate sides with friction first touch and then slide; 1 if there are none.
+
+    Arguments as in ``touched_at``, with the states that it returned.
     """
-    way, x, least = (ahead - u).reshape(-1, 3), nodes + ahead.reshape(-1, 3), 1.0
+    move, x, least = (ahead - u).reshape(-1, 3), nodes + ahead.reshape(-1, 3), 1.0
     for interface, state in zip(interfaces, states, strict=True):
         if interface.pair.friction == 0.0 or (state.pressure > 0.0).any():
             continue
         points = interface.points(x, step.before, step.time)
         share, edge = state.touched_at[points.sites], interface.edge[points.sites]
-        drag = np.linalg.norm(tangential(points.relative(way) - points.carried, points.normal), axis=1)
+        drag = np.linalg.norm(tangential(points.relative(move) - points.carried, points.normal), axis=1)
         slides = (1.0 - share) * drag > _SLID * edge
         least = min(least, float((share + _PAST)[slides & (share < 1.0)].min(initial=1.0)))
     return least
 
 
 def slid_unheld(interfaces: Sequence[Interface], states: Sequence[ContactState], u: Array, found: Equilibrium) -> bool:
-    """Whether something came to touch in a step, at a share of it that is not known, and has slid far by then.
+    """Whether contact began in a step at an unknown time with a large tangential motion.
 
     Args:
-        interfaces: What may touch.
-        states: What was known of it where the step began.
+        interfaces: Contact interfaces.
+        states: Their states at the start of the step.
         u: Displacement there [m], shape (3N,).
-        found: The equilibrium at its end.
+        found: Equilibrium at the end of the step.
     """
     moved = (found.displacement - u).reshape(-1, 3)
     for interface, state, points, tractions in zip(interfaces, states, found.points, found.tractions, strict=True):

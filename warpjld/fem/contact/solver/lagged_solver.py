@@ -1,4 +1,4 @@
-"""Linear solves of a contact problem: by a factor where that is cheap, else with a lagged preconditioner."""
+"""Linear solves of a contact problem: by a sparse factor where that is cheap, else with a lagged preconditioner."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ from warpjld.fem.solver.linear import LinearSolver
 __all__ = ["LaggedSolver"]
 
 _INNER = 1e-4
+"""Relative tolerance of iterative solves."""
 _MOST = 150
-"""Iterations of a solve that is not symmetric."""
+"""Most iterations of a non-symmetric solve with a new preconditioner."""
 _PATIENCE = 25
-"""Iterations after which a preconditioner made for an earlier matrix has served its time."""
+"""Most iterations with a preconditioner of an earlier matrix, before a new one is made."""
 _BESIDE = 80
-"""Iterations over a factor of K: what is not symmetric has the rank of the few points that touch."""
+"""Most iterations of a non-symmetric solve preconditioned by a factor of K; the non-symmetric part has low rank."""
 _WORK, _PROFILE = 2e5, 6e5
-"""Multiplications a degree of freedom up to which a factor costs less than multigrid's iterations: a ball's costs more
-from a few thousand nodes on, that of fingers and shells does not; and of the quick estimate, above which it is not even
-tried."""
+"""Multiplications per degree of freedom up to which a factor is cheaper than multigrid iterations (that of a ball is
+not from a few thousand nodes on, that of fingers and shells is); and the bound on a quick estimate above which
+factorisation is not tried."""
 
 
 class LaggedSolver:
-    """Solves with the matrices of a contact problem, one like the other.
+    """Linear solver for the successive, similar matrices of a contact problem.
 
-    Where a sparse factor of K is cheap every matrix gets its own; what is added to K and not symmetric then takes a few
-    iterations. Else, or where K is not positive definite, a multigrid preconditioner is kept while it serves.
+    If a sparse factor of K is cheap, every matrix is factorised, and a non-symmetric part takes a few iterations.
+    Otherwise, or if K is not positive definite, a multigrid preconditioner is reused as long as it converges quickly.
 
     Args:
         body: All bodies, merged.
@@ -49,13 +50,13 @@ class LaggedSolver:
         self._large = False
 
     def begin(self) -> None:
-        """A new step: its first matrix gets a preconditioner of its own."""
+        """Start a load step: its first matrix gets a new preconditioner."""
         self._solver = None
 
     def solve(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any = None) -> Iteration:
-        """K11 x = b for the free degrees of freedom, shape (3N,), with the preconditioner before while it serves.
+        """Solve K11 x = b for the free degrees of freedom, shape (3N,).
 
-        What is added to K and not symmetric, ``csr_array`` (3N, 3N), is preconditioned by K.
+        ``nonsymmetric``, ``csr_array`` (3N, 3N), is added to K; the solve is then preconditioned by K.
 
         Raises:
             IndefiniteError: K is not positive definite.
@@ -64,7 +65,7 @@ class LaggedSolver:
         if factor is not None:
             if nonsymmetric is None:
                 return factor.solve(right)
-            # what it leaves over no other preconditioner takes away: an inexact step is the best there is
+            # no other preconditioner would do better: if this does not converge, the inexact step is used
             return factor.solve_nonsymmetric(nonsymmetric, right, tolerance=_INNER, iterations=_BESIDE)
         if nonsymmetric is not None:
             return self._nonsymmetric(matrix, free, right, nonsymmetric)
@@ -78,7 +79,7 @@ class LaggedSolver:
                 sofar = done
                 left = right - before.masked_product(done.x)
         solver = self._new(matrix, free)
-        if sofar is not None:  # go on from where the old preconditioner got to
+        if sofar is not None:  # continue from the result with the old preconditioner
             done = solver.solve(left, tolerance=_INNER / sofar.residual)
             done = replace(done, x=done.x + sofar.x, iterations=done.iterations + sofar.iterations)
         else:
@@ -86,7 +87,7 @@ class LaggedSolver:
         return self._kept(solver, done)
 
     def _factor(self, matrix: BlockMatrix, free: Mask) -> LinearSolver | None:
-        """A direct solver; None where it costs too much, or K is not positive definite."""
+        """A direct solver; None if it costs too much, or K is not positive definite."""
         active, degrees = np.asarray(free.reshape(-1, 3).any(axis=1)), int(free.sum())
         if self._direct is None and not self._large:
             self._large = work_by_profile(matrix.rows, matrix.columns, active) > _PROFILE * degrees

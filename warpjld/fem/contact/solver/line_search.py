@@ -1,4 +1,4 @@
-"""Line search along a Newton step: by elements' Jacobians, by the work of what drives on, by the residual."""
+"""Line searches along a Newton step: by Jacobian determinants, by the work of the residual, by its norm."""
 
 from __future__ import annotations
 
@@ -14,25 +14,27 @@ from warpjld.fem.contact.solver.newton_state import NewtonState
 __all__ = ["length_by_residual", "length_by_work", "length_upright"]
 
 _TRIALS = 8
+"""Most trial lengths of a line search."""
 _OVERSHOT = 0.5
-"""Pull back over what drives here, from which on a step was too long."""
+"""Negative slope at the end over the slope at the start of a step, above which the step is too long."""
 _BALANCED = 0.3
-"""The same where the search ends."""
+"""Slope over that at the start, in absolute value, at which the search ends."""
 _LEAST = 1e-6
+"""Shortest step length."""
 _FLATTEST = 0.2
-"""Part of their Jacobian determinants that elements keep in a step."""
+"""Fraction of their Jacobian determinants that elements keep in a step."""
 
 
 def length_upright(elastic: Elastic, u: Array, move: Array, lowest: Array) -> float:
-    """The longest of 1, ½, ¼ … that flattens no element to less than a part of what it is, 0 where none does not.
+    """Longest step of 1, ½, ¼ … in which every element keeps ``_FLATTEST`` of its Jacobian determinant; 0 if none does.
 
-    Nearly inside out, flesh answers with forces that no later step finds its way back from.
+    Nearly inverted elements cause forces from which Newton's method does not recover.
 
     Args:
         elastic: The bodies.
         u: Displacement [m], shape (3N,).
-        move: From there, shape (3N,).
-        lowest: Lowest Jacobian determinants of the elements there, shape (E,).
+        move: Newton step [m], shape (3N,).
+        lowest: Lowest Jacobian determinants of the elements at u, shape (E,).
     """
     length = 1.0
     for _ in range(_TRIALS):
@@ -43,16 +45,17 @@ def length_upright(elastic: Elastic, u: Array, move: Array, lowest: Array) -> fl
 
 
 def length_by_work(state: NewtonState, move: Array, most: float, watched: Mask) -> float:
-    """``most``; or, where forces on the watched degrees of freedom (3N,) pull back there harder than half of what
-    drives here, to where they balance along the way. A contact that opens and closes in turn settles so, and what
-    falls freely stops where it first touches.
+    """Step length at which the residual does no work along the move (3N,), if the step ``most`` overshoots it.
+
+    Only the watched degrees of freedom (3N,) count. This settles contacts that open and close in turn, and stops freely
+    falling bodies at their first contact.
     """
     if not watched.any():
         return most
     along = np.where(watched, move, 0.0)
 
     def pull(part: float) -> float:
-        """What drives on after part of the way; contact as the linear model has it."""
+        """Work rate of the residual at a step length; contact by its linearised kinematics."""
         pushed = state.system.nodal(state.contact.points, state.predicted(part * move))
         return dot(state.pull(state.u + part * move) + pushed, along)
 
@@ -63,8 +66,9 @@ def length_by_work(state: NewtonState, move: Array, most: float, watched: Mask) 
 
 
 def length_by_residual(state: NewtonState, move: Array, most: float) -> float:
-    """How far to go, ``most`` at most, for forces to balance better than here: where points come and go in turn, or
-    K is indefinite, the work along the way does not tell.
+    """Step length up to ``most`` at which the norm of the residual decreases, or the best one tried.
+
+    Used with a non-symmetric tangent, for which the work along the move is no measure.
     """
     now = norm(state.residual)
     length, best = most, (np.inf, most)
@@ -82,7 +86,7 @@ def length_by_residual(state: NewtonState, move: Array, most: float) -> float:
 
 
 def _balance(pull: Callable[[float], float], end: float, at_start: float, at_end: float) -> float:
-    """Part of the way up to ``end`` at which what drives on changes its sign, about (Illinois' regula falsi)."""
+    """Approximate step length up to ``end`` at which the slope changes sign, by regula falsi (Illinois variant)."""
     low, high, driving, against = 0.0, end, at_start, at_end
     for _ in range(_TRIALS):
         margin = 0.02 * (high - low)

@@ -1,4 +1,4 @@
-"""Load stepping: an equilibrium at each time from a predictor, steps halved where they fail."""
+"""Load stepping: an equilibrium at each time from a predictor, with adaptive cutting and halving of steps."""
 
 from __future__ import annotations
 
@@ -32,28 +32,31 @@ from warpjld.fem.solver.krylov import SolveStatus
 __all__ = ["Guess", "LoadSteps"]
 
 _HALVINGS = 7
+"""Most successive halvings of a failing load step."""
 _HALVINGS_UNHELD = 3
+"""The same if the failure is a body that slides away or is not held, which seldom depends on the length of the step."""
 _UNHELD = (SolveStatus.SLIDING, SolveStatus.UNHELD)
-"""A body that slides away, or falls, seldom does so because the step is long."""
+"""Statuses of a body that slides away or is not held."""
 _BRIEF = 25
-"""Iterations of a search where no step may be halved: who asks for that has a shorter step in hand."""
+"""Most Newton iterations of a search if no step may be halved: the caller will try a shorter step itself."""
 _BREAKS = 100
+"""Most rounds of breaking bonds in a load step."""
 _CUTS = 400
-"""Steps that those asked for are cut to at most, so that contact can follow."""
+"""Most cuts of steps in a run, made so that contact search can follow."""
 _TOUCHING = 0.01
-"""Share of a step from which on it is cut where something first touches."""
+"""Smallest fraction of a step at which it is cut for a first contact."""
 _TOUCHES, _TOUCHES_ADRIFT = 8, 2
-"""Halvings of a step at most in which friction first takes hold of what has slid by then; the same of a body that
-nothing holds, which falls however short the step is."""
+"""Most halvings of a step in which frictional contact begins after sliding at an unknown time; and the same for a free
+body, which falls however short the step is."""
 _WHOLE = 0.95
-"""Share of a step from which on it is left whole."""
+"""Fraction of a step above which it is not cut."""
 _FAR = 2.2
-"""How far contact looks, over the overlap at a start that it is to part: what is farther off than half of it fades."""
+"""Search distance over the initial overlap that has to be removed; contact fades beyond half of it."""
 _PART = 0.85
-"""How far along the course of the step before a first guess goes: contact stiffens what it meets."""
+"""Fraction of the last step's correction that a predictor adds: contact stiffens, so corrections decrease."""
 
 Guess = Callable[[float, float, Array], Array]
-"""Time before, time, displacement before (N, 3) → where to begin to look for the displacement at the time (N, 3)."""
+"""Predictor: time before, time, displacement before (N, 3) → guess of the displacement at the time (N, 3)."""
 
 
 class LoadSteps:
@@ -61,15 +64,15 @@ class LoadSteps:
 
     Args:
         body: All bodies, merged.
-        prescribed: Known displacements.
-        pairs: What may touch what.
+        prescribed: Dirichlet conditions.
+        pairs: Contact pairs.
         loads: Loads.
-        times: Rising times to find equilibria at.
-        after: Contact and displacement to go on from.
-        tolerance: Residual over the forces that balance.
-        penetration: Overlap left, as a share of an edge.
-        guess: Where to begin to look.
-        halvings: How often a step may be halved, and its halves again.
+        times: Ascending times at which equilibria are returned.
+        after: Solution to continue from.
+        tolerance: Residual relative to the forces in balance.
+        penetration: Admissible penetration, relative to an element edge.
+        guess: Predictor.
+        halvings: Most successive halvings of a load step.
     """
 
     def __init__(
@@ -102,7 +105,7 @@ class LoadSteps:
         if after is None:
             self.start = 0.0
             self.u = np.zeros(body.degrees)
-            self._look_behind()
+            self._extend_search()
             self.states = [self._begin(interface) for interface in self.interfaces]
         else:
             if after.last.displacement.size != body.degrees:
@@ -114,13 +117,13 @@ class LoadSteps:
         self.correction_rate = None if after is None else after.correction_rate
         self.last_step = None if after is None else after.last_step
 
-    def _look_behind(self) -> None:
-        """Let points look as far as bodies overlap at the start, until they are parted."""
+    def _extend_search(self) -> None:
+        """Extend the search distance to the depth of initial overlaps, until these are removed."""
         for k, interface in enumerate(self.interfaces):
             interface.reach = max(interface.reach, _FAR * self.passing.depth(self.u, k))
 
     def _begin(self, interface: Interface) -> ContactState:
-        """Bonds made, and the overlap noted that there is at the start."""
+        """Initial state of an interface: bonds made, initial overlaps stored as allowance (R112)."""
         state = initial_state(len(interface.edge), interface.pair)
         points = interface.points(self.body.mesh.nodes, 0.0, 0.0)
         if interface.pair.bond is not None:
@@ -133,6 +136,7 @@ class LoadSteps:
         return state
 
     def _step(self, before: float, time: float) -> LoadStep:
+        """Load step between two times."""
         share = time / self.times[-1]
         known = self.prescribed
         now = known(time) if callable(known) else known.scaled(share)
@@ -144,8 +148,8 @@ class LoadSteps:
     def run(
         self, watch: Callable[[ContactInstant], str | None] | None, progress: Callable[[str], None] | None
     ) -> ContactSolution:
-        """Every time, or as far as equilibria are found; ``watch`` and ``progress`` as in ``press``."""
-        tell = progress or (lambda text: None)
+        """Solve all times, or as far as equilibria are found; ``watch`` and ``progress`` as in ``press``."""
+        report = progress or (lambda text: None)
         now, halvings = self.start, 0
         reached: list[ContactInstant] = []
         todo = list(self.times)
@@ -169,7 +173,7 @@ class LoadSteps:
                 todo.insert(0, 0.5 * (now + target))
                 continue
             if found is None and unheld is not None:
-                # what nothing holds may find no equilibrium in a shorter step: the longer one's, then
+                # a free body may have no equilibrium in the shorter step: use that of the longer one
                 target, carried, step, found = unheld
                 todo, touches, status = [time for time in todo if time >= target], most, SolveStatus.CONVERGED
             unheld = None
@@ -190,7 +194,7 @@ class LoadSteps:
                     status, reason = self._reason(status, through, unstable)
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
-                tell(f"time {target:.3g}: {status.value}; halving the step")
+                report(f"time {target:.3g}: {status.value}; halving the step")
                 todo.insert(0, 0.5 * (now + target))
                 continue
             self._take(found, carried, now, target)
@@ -200,49 +204,49 @@ class LoadSteps:
             if target not in self.times:
                 continue
             reached.append(self._instant(target, found, solves, iterations))
-            tell(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
+            report(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
             solves = iterations = touches = 0
-            if watch and (wish := watch(reached[-1])):
-                return self._end(SolveStatus.STOPPED, reached, wish, step)
+            if watch and (stop := watch(reached[-1])):
+                return self._end(SolveStatus.STOPPED, reached, stop, step)
         return self._end(SolveStatus.CONVERGED, reached, SolveStatus.CONVERGED.value, step)
 
     def _sliding(self, step: LoadStep) -> SolveStatus:
-        """Whether a body that was seen to slide does so by statics, or the solver found no way to hold it."""
+        """``SLIDING`` only if statics proves that friction cannot hold the body; else the solver failed to find how."""
         if not self._could_hold(step):
             return SolveStatus.SLIDING
         self.newton.failure = "friction could hold it, but how was not found"
         return SolveStatus.MAX_ITERATIONS
 
     def _reason(self, status: SolveStatus, through: str, unstable: bool) -> tuple[SolveStatus, str]:
-        """Why steps are halved no more; where longer steps were ``unstable``, they say why."""
+        """Final status and reason of a failure; indefinite if a longer step was (``unstable``)."""
         if unstable and status is SolveStatus.MAX_ITERATIONS:
             return SolveStatus.INDEFINITE, through or SolveStatus.INDEFINITE.value
         return status, through or self.newton.failure or status.value
 
     def _share(self, step: LoadStep, carried: Array, cut: float, *, may_cut: bool) -> tuple[float, float]:
-        """How much of a step to take so that bodies do not pass one another and friction acts from the first touch on;
-        1 for all of it. And the share that passing bodies leave of it, to tell guesses that jump (``guess_jumps``)."""
+        """Fraction of a step to take, so that bodies do not pass through each other and friction acts from the first
+        contact on; and the fraction due to the former, by which ``guess_jumps`` detects discontinuous predictors."""
         ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
         share = self.passing.share(self.u, ahead, step.before, step.time)
         if share < _WHOLE and may_cut and not guess_jumps(share, cut):
             return share, share
-        way = (self.body.mesh.nodes, self.u, ahead)
-        self.states = touched_at(self.interfaces, self.states, *way, step)
-        share = first_touch(self.interfaces, self.states, *way, step)
+        motion = (self.body.mesh.nodes, self.u, ahead)
+        self.states = touched_at(self.interfaces, self.states, *motion, step)
+        share = first_touch(self.interfaces, self.states, *motion, step)
         return share if _TOUCHING < share < _WHOLE and may_cut else 1.0, cut
 
     def _take(self, found: Equilibrium, carried: Array, now: float, target: float) -> None:
-        """Go on from an equilibrium."""
+        """Accept an equilibrium as the start of the next step."""
         self.steps.append(self.newton.solves)
         self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
         self.last_step = self._last_step(now, found)
         self.u, self.states = found.displacement, found.states
         if target in self.times:
             for interface, reach in zip(self.interfaces, self._reaches, strict=True):
-                interface.reach = reach  # what overlapped at the start is parted
+                interface.reach = reach  # initial overlaps are removed at the first time
 
     def _through(self, step: LoadStep, found: Equilibrium) -> str:
-        """What went through what, or lies in it unseen, in words; nothing where nothing does."""
+        """Message about bodies that passed through, or lie undetected inside, each other; empty if there are none."""
         if step.allowed > 0.0:
             return ""
         pressed = [t.active for t in found.tractions]
@@ -257,7 +261,8 @@ class LoadSteps:
         return usual if self.halvings is None else min(usual, self.halvings)
 
     def _blocked(self, step: LoadStep, found: Equilibrium | None) -> str:
-        """Overlap that nothing can part, in words; looked for where a step failed, or ended with an overlap."""
+        """Message about an overlap of two prescribed sides; empty if there is none. ``found`` is None for a failed
+        step."""
         free = step.prescribed.free(self.body.degrees)
         if found is None:
             u = self.u.copy()
@@ -269,10 +274,10 @@ class LoadSteps:
         return blocked(self.interfaces, points, self.states, free, allowed=step.allowed)
 
     def _find(self, step: LoadStep, carried: Array) -> tuple[SolveStatus, Equilibrium | None]:
-        """Equilibrium of a step; again after every bond that did not hold."""
+        """Equilibrium of a step, repeated after bonds were broken."""
         guesses = self._guesses(step, carried)
         status, found = self.newton.find(self.u, self.states, step, *guesses)
-        # whoever wants no step halved tries another one
+        # with halvings=0 the caller tries another step instead
         again = self.halvings != 0 and self._adrift_on_friction(step)
         if found is None and again and self._could_hold(step):
             status, found = from_rougher(self.newton, self.interfaces, self.u, self.states, step, status)
@@ -288,33 +293,33 @@ class LoadSteps:
         return SolveStatus.MAX_ITERATIONS, None
 
     def _adrift_on_friction(self, step: LoadStep) -> bool:
-        """Whether a body is held by friction alone."""
+        """Whether a free body may be held by friction."""
         return self.course.adrift(step.prescribed) and any(i.pair.friction > 0.0 for i in self.interfaces)
 
     def _could_hold(self, step: LoadStep) -> bool:
-        """Whether forces at contacts could balance every body that nothing else holds; whether they may is unknown."""
+        """Whether contact forces inside the friction cones could balance every free body (necessary condition)."""
         x = self.body.mesh.nodes + self.u.reshape(-1, 3)
         points = [interface.points(x, step.before, step.time) for interface in self.interfaces]
         force = external_forces(self.body, step.loads, self.u if self.body.large_strain else None).reshape(-1, 3)
-        loose = [nodes for nodes, _ in free_motions(self.body, step.prescribed)]
+        free = [nodes for nodes, _ in free_motions(self.body, step.prescribed)]
         known = (x, force, step.prescribed.degrees, self.interfaces, points)
-        return all(could_balance(nodes, *known) for nodes in loose)
+        return all(could_balance(nodes, *known) for nodes in free)
 
     def _carried(self, step: LoadStep) -> Array:
-        """The displacement that a step begins from, carried on as the caller knows how, shape (3N,)."""
+        """Displacement at the start of a step, advanced by the caller's predictor, shape (3N,)."""
         if self.guess is None:
             return self.u
         return np.asarray(self.guess(step.before, step.time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
 
     def _guesses(self, step: LoadStep, carried: Array) -> list[Array]:
-        """Where to begin, best first: as asked, and what it was off by in the step before taken to be off by again."""
+        """Initial guesses: the predictor with the last step's correction repeated, and the predictor alone."""
         plain = [] if self.guess is None else [carried]
         if self.correction_rate is None:
             return plain
         return [carried + _PART * (step.time - step.before) * self.correction_rate.reshape(-1), *plain]
 
     def _last_step(self, before: float, found: Equilibrium) -> LastStep:
-        """Where the step to an equilibrium began."""
+        """Start of the step to an equilibrium, with its slips and areas, for sensitivities."""
         slips = [np.zeros((len(interface.edge), 3)) for interface in self.interfaces]
         areas = [np.zeros(len(interface.edge)) for interface in self.interfaces]
         for k, points in enumerate(found.points):
@@ -340,8 +345,8 @@ class LoadSteps:
 
     def _end(self, status: SolveStatus, reached: list[ContactInstant], message: str, step: LoadStep) -> ContactSolution:
         if not reached:
-            nothing = np.zeros((len(self.body.mesh.nodes), 3))
-            reached = [ContactInstant(self.start, self.u.reshape(-1, 3), nothing, (), 0, 0, 0.0)]
+            zero = np.zeros((len(self.body.mesh.nodes), 3))
+            reached = [ContactInstant(self.start, self.u.reshape(-1, 3), zero, (), 0, 0, 0.0)]
         states, steps = tuple(self.states), tuple(self.steps)
         rate, last = self.correction_rate, self.last_step
         return ContactSolution(status, tuple(reached), message, states, steps, step.loads, rate, last)

@@ -1,4 +1,4 @@
-"""State of Newton's method in a load step: displacement, contact states and residual, and how they go on."""
+"""Iterate of Newton's method in a load step: displacement, contact states and residual, and their update."""
 
 from __future__ import annotations
 
@@ -23,28 +23,36 @@ from warpjld.fem.contact.solver.elastic import Elastic
 __all__ = ["Equilibrium", "NewtonState", "guess_held"]
 
 _ROUNDING = 1e-13
-"""Part of stiffness times displacement that is rounding, where bodies move without a force."""
+"""Relative rounding error of internal forces, over stiffness times displacement."""
 _PLACES = 0.03
-"""The same of positions, over that of displacements: gaps are differences of positions."""
+"""Weight in that error of stiffness times body size: gaps are differences of positions."""
 _TURNING = 1
-"""Iterations after which normals stay where their derivatives are not known; weights follow until they no longer change
-the gaps. That both are right is looked at once forces balance."""
+"""Iterations after which normals without known derivatives are frozen; weights are updated until gaps no longer change.
+Both are verified at convergence (``confirmed``)."""
 _FIXED_POINT = 8
-"""Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
+"""Iterations of the fixed-point phase."""
 _SAME = 2
-"""Iterations in a row in which the same points touch, slide and stick, after which friction follows the present
-pressure: taking what points press and what they rub in turns creeps."""
+"""Successive iterations with the same active set after which friction is bounded by the current pressure; alternating
+between pressure and friction converges slowly."""
 _SHORT, _STUMBLES = 0.1, 2
-"""Shortest step of friction that follows the present pressure beside points that stick, and how often one may be
-shorter: points on the edge of sticking then come and go, and taking pressure and friction in turns is safer."""
+"""Step length of coupled friction beside sticking points that counts as a stumble, and number of stumbles after which
+friction is no longer coupled: points at the limit of sticking alternate then."""
 _MULTIPLIERS_GOOD = 1
-"""Iterations after which multipliers are good enough to take the derivatives of directions with; until then those of
-the equilibrium before are."""
+"""Iterations after which multipliers are used in derivatives of normals; before that, those of the last equilibrium."""
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """Equilibrium at the end of a load step."""
+    """Equilibrium at the end of a load step.
+
+    Attributes:
+        displacement: [m], shape (3N,).
+        reactions: Forces at prescribed degrees of freedom [N], zero elsewhere, shape (3N,).
+        points, tractions: Contact points of each interface, and their tractions.
+        slips: Slips of the points in the step, with friction [m], shape (m, 3) for each interface.
+        states: Contact states for the next step.
+        residual: Relative residual.
+    """
 
     displacement: Array
     reactions: Array
@@ -56,29 +64,29 @@ class Equilibrium:
 
 
 class NewtonState:
-    """A search for the equilibrium at the end of a load step.
+    """Iterate of the search for the equilibrium at the end of a load step.
 
     Args:
         elastic: The bodies.
         system: Their contact.
         step: The load step.
         start: Displacement at its start [m], shape (3N,).
-        states: What is known of contact points there.
-        guess: Where to begin to look [m], shape (3N,), no element inside out; None: at ``start``, what is prescribed
-            yet to go to its place.
-        tolerance: Residual over the forces that balance.
-        penetration: Overlap left, as a share of an edge.
+        states: Contact states there.
+        guess: Initial guess [m], shape (3N,), without inverted elements; None: ``start``, with the Dirichlet values
+            applied in the first Newton step.
+        tolerance: Residual relative to the forces in balance.
+        penetration: Admissible penetration, relative to an element edge.
 
     Attributes:
         u: Displacement [m], shape (3N,).
-        jump: What prescribed degrees of freedom have yet to go [m], shape (3N,).
-        free: Which are not prescribed, shape (3N,).
-        states: Multipliers and active sets.
+        jump: Remaining increment of prescribed degrees of freedom [m], shape (3N,).
+        free: Mask of degrees of freedom that are not prescribed, shape (3N,).
+        states: Contact states with multipliers and active sets.
         contact: Contact forces at ``u``.
-        tangent: The bodies' forces and stiffness at ``u``.
-        residual: Forces left over at what is free [N], shape (3N,).
-        unbalanced: Their size over that of the forces that balance.
-        restarts: How often forces balanced and points, found afresh, did not agree.
+        tangent: Internal forces and stiffness of the bodies at ``u``.
+        residual: Residual at free degrees of freedom [N], shape (3N,).
+        unbalanced: Norm of the residual relative to the forces in balance.
+        restarts: How often the search converged but contact points, searched again, did not agree.
     """
 
     contact: ContactForces
@@ -108,8 +116,8 @@ class NewtonState:
         self.restarts = 0
         if guess is not None:
             self.u = guess_held(step, guess)
-            # a guess squeezes elements here and there: their false pressures would make K indefinite, those of the
-            # equilibrium before do not
+            # a guess compresses single elements, whose spurious pressures would make K indefinite; those of the
+            # previous equilibrium do not
             self._pressures = elastic.pressures(start)
         else:
             self.u = start.copy()
@@ -125,39 +133,39 @@ class NewtonState:
 
     @property
     def alternating(self) -> bool:
-        """Whether the fixed-point phase is over, and steps and multipliers take turns."""
+        """Whether the alternating phase has begun."""
         return self.turn >= _FIXED_POINT or self.restarts > 0
 
     @property
     def predicts(self) -> ActiveSet:
-        """What decides on the active set after a linear solve."""
+        """Rule for the active set after a linear solve."""
         return ActiveSet.TRIAL if self.alternating else ActiveSet.PREDICTED
 
     @property
     def arrived(self) -> bool:
-        """Whether what is prescribed is where it is to be."""
+        """Whether the Dirichlet values are reached."""
         return not self.jump.any()
 
     def forces(
         self, points: list[ContactPoints], u: Array, decides: ActiveSet, *, coupled: bool = False
     ) -> ContactForces:
-        """Contact forces at points of displacement u (3N,), with the present multipliers."""
+        """Contact forces at points of displacement u (3N,), with the current multipliers."""
         return self.system.forces(points, u - self.start, self.states, self.step.allowed, decides, coupled=coupled)
 
     def predicted(self, move: Array) -> list[ContactTractions]:
-        """Tractions after a move (3N,), by the linear model."""
+        """Tractions after a move (3N,), by linearised kinematics."""
         return self.system.predicted(self.contact, self.states, move, self.step.allowed, self.predicts)
 
     def pull(self, u: Array) -> Array:
-        """External less internal forces of the bodies alone at displacement u [N], shape (3N,)."""
+        """External minus internal forces of the bodies at displacement u, without contact [N], shape (3N,)."""
         return self.elastic.external(self.step.loads, u) - self.elastic.forces(u).forces
 
     def left_over(self) -> float:
-        """Forces that do not balance at what is free, their size [N]."""
+        """Norm of the residual at free degrees of freedom [N]."""
         return norm(np.where(self.free, self.pull(self.u) + self.contact.forces, 0.0))
 
     def assemble(self) -> None:
-        """Find the forces, and what of them is left over."""
+        """Evaluate forces, tangent and residual at u."""
         self._iteration += 1
         elastic, u, free, contact = self.elastic, self.u, self.free, self.contact
         self.tangent = elastic.at(u, self._pressures, self.step.loads)
@@ -174,14 +182,17 @@ class NewtonState:
         self._quiet = pushed <= noise
 
     def balanced(self) -> bool:
-        """Whether forces balance as the points see them."""
+        """Whether the convergence criteria (6) hold with the current contact points."""
         if not (self.arrived and self._near):
             return False
         return self._quiet or self.system.settled(self.contact, self.states, self._negligible)
 
     def confirmed(self) -> bool:
-        """Whether the points see what is so; where not, the search goes on, carefully, with points that do: it is near
-        a solution, and full steps would only lead away from it again (what touches may depend on which they are)."""
+        """Whether contact points, searched again at u, agree with the current ones.
+
+        If not, the search continues with the new points in the alternating phase, as it is near a solution and full
+        steps would lead away from it.
+        """
         self._normals = self.system.normals(self.u)
         fresh = self.system.points(self.u, self.step, self._normals)
         if self.step.allowed > 0.0:
@@ -194,24 +205,24 @@ class NewtonState:
         return False
 
     def equilibrium(self) -> Equilibrium:
-        """What was found."""
+        """The equilibrium at u, with contact states for the next step."""
         contact = self.contact
-        nothing = np.zeros_like(self.u)
-        kept = self.system.updated(self.states, contact, contact.tractions, nothing, ActiveSet.TRIAL)
-        left = 1.0 if self.step.allowed > 0.0 else 0.0  # what was parted stays so
+        zero = np.zeros_like(self.u)
+        kept = self.system.updated(self.states, contact, contact.tractions, zero, ActiveSet.TRIAL)
+        left = 1.0 if self.step.allowed > 0.0 else 0.0  # once removed, initial overlaps are no longer admissible
         kept = [replace(s, slip_anchor=np.zeros_like(s.slip_anchor), allowance=left * s.allowance) for s in kept]
-        # on the way to where friction took hold of it, what was apart slid on nothing
+        # sliding before contact began is not slip
         known = zip(contact.slips, self.states, contact.points, strict=True)
         slips = [slip - s.slip_anchor[p.sites] for slip, s, p in known]
         return Equilibrium(self.u, self._reactions, contact.points, contact.tractions, slips, kept, self.unbalanced)
 
     def linearise(self) -> None:
-        """Find what a symmetric stiffness leaves out."""
+        """Evaluate the non-symmetric part E of the tangent."""
         pressed = self.states if self._iteration >= _MULTIPLIERS_GOOD else self._before
         self.contact = self.system.linearise(self.contact, self.states, pressed, self.u)
 
     def advance(self, move: Array, length: float) -> None:
-        """Go a part of the way along a move (3N,), then update multipliers and contact points."""
+        """Advance along a move (3N,) by a step length, then update multipliers and contact points."""
         alternating, decides = self.alternating, self.predicts
         move = length * move
         self._pressures = self.elastic.pressures(self.u, move)
@@ -233,7 +244,7 @@ class NewtonState:
         self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
 
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:
-        """Points after a move: seen afresh until that no longer changes the gaps."""
+        """Contact points after a move, searched again until that no longer changes the gaps."""
         points = [shifted(p, (self.u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
         if not self._settled:
             self._normals = self.system.turned(self._normals, self.u, self._iteration < _TURNING)
@@ -246,7 +257,7 @@ class NewtonState:
 
 
 def guess_held(step: LoadStep, u: Array) -> Array:
-    """A displacement (3N,) with the prescribed values where there are such."""
+    """A displacement (3N,) with the Dirichlet values of a step inserted."""
     out = np.array(u, dtype=np.float64).reshape(-1)
     out[step.prescribed.degrees] = step.prescribed.values
     return out

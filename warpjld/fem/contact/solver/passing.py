@@ -1,8 +1,8 @@
-"""Bodies that would pass through each other: steps too long for contact to follow, and nodes deep in another body.
+"""Detection of bodies that pass through each other: steps too long for contact search, and nodes deep in other bodies.
 
-Contact looks about two edges ahead, and two behind. What goes farther in one step may begin before a surface and end
-behind it, or so deep that nothing is seen, and no force says so. Both are looked at without contact's own points: by
-distances to the whole boundary of the other body.
+Contact search reaches about two element edges to both sides of a surface. A larger motion in one step may begin in
+front of a surface and end behind it, or so deep that no contact is found. Both are detected independently of contact
+points, by distances to the whole boundary of the other body.
 """
 
 from __future__ import annotations
@@ -19,26 +19,35 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.enclosure import Enclosure
 from warpjld.fem.contact.interface.mortar import Mortar
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
-from warpjld.fem.contact.obstacles.thickness import half_thickness, way_past
+from warpjld.fem.contact.obstacles.thickness import half_thickness, relative_paths
 from warpjld.fem.load.prescribed import components
 
 __all__ = ["LEAST_SHARE", "Passing", "guess_jumps"]
 
 _FOLLOWED = 0.75
-"""How far behind a surface a step may aim, over what contact looks ahead: farther off it fades."""
+"""Largest predicted depth behind a surface, over the search distance of contact, which fades beyond."""
 _DEEP = 0.5
-"""Edges that an unpressed node may lie in another body: faces that do not match stand some way inside each other."""
+"""Admissible depth of an inactive node in another body, in element edges: faces that do not match overlap somewhat."""
 LEAST_SHARE = 1.0 / 64.0
-"""Least share of a step that is asked for."""
+"""Smallest fraction to which a step is cut."""
 _THINNEST = 2.5e-4
-"""Obstacles are no thinner than twice this [m]."""
+"""Smallest half thickness of obstacles [m]."""
 _LOOKS, _MOST_LOOKS = 4, 32
-"""Places at which the way of a step is looked at, for each part that contact could follow, and at most."""
+"""Positions sampled along a step per part that contact could follow, and most of them."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """Nodes of one side of a pair, the typical edge there, and the body that the other side belongs to."""
+    """One side of a pair.
+
+    Attributes:
+        interface: Index of the interface.
+        nodes: Its nodes, shape (n,).
+        edge: Typical element edge at them [m], shape (n,).
+        other: Boundary of the body that the other side belongs to.
+        opposite: Nodes of the other side.
+        opposite_edge: Median element edge there [m].
+    """
 
     interface: int
     nodes: Ints32
@@ -49,11 +58,11 @@ class _Side:
 
 
 class Passing:
-    """Watches every pair that is not bonded: bodies, a body's own parts, and obstacles.
+    """Detection for every pair that is not bonded: two bodies, a body with itself, a body with an obstacle.
 
     Args:
         body: All bodies, merged.
-        interfaces: What may touch.
+        interfaces: Contact interfaces.
     """
 
     def __init__(self, body: Body, interfaces: Sequence[Interface]) -> None:
@@ -74,7 +83,7 @@ class Passing:
             self._sort(body, between)
 
     def _sort(self, body: Body, between: list[tuple[int, Interface, Mortar]]) -> None:
-        """Pairs of two bodies from those of one body with itself."""
+        """Divide deformable pairs into those of two bodies and those of one body with itself."""
         piece = components(body)
         quads = np.ascontiguousarray(body.mesh.quads(body.mesh.boundary()), dtype=np.int32)
         around: dict[tuple[int, ...], Enclosure] = {}
@@ -94,7 +103,7 @@ class Passing:
                 self._sides.append(_Side(k, one.nodes, one.edge, far, two.nodes, float(np.median(two.edge))))
 
     def share(self, u: Array, ahead: Array, before: float, time: float) -> float:
-        """Share of the way from displacement u at a time to another (3N,) at a later one that contact can follow."""
+        """Fraction of the motion from displacement u to ``ahead`` (3N,) between two times that contact can follow."""
         x, step = self._moved(u), (ahead - u).reshape(-1, 3)
         least = 1.0
         for side in self._sides:
@@ -106,10 +115,10 @@ class Passing:
         return max(least, LEAST_SHARE)
 
     def _past_body(self, side: _Side, x: Array, step: Array) -> float:
-        """Share of a step (N, 3) from x (N, 3) in which no node of a side goes too far past the other body."""
+        """Fraction of a step (N, 3) from x (N, 3) in which no node of a side moves too far into the other body."""
         followed = _FOLLOWED * self._interfaces[side.interface].reach
         mine, theirs = step[side.nodes], step[side.opposite]
-        # a bound on how far any of one side goes past any of the other
+        # an upper bound on the relative motion of the two sides
         middle = 0.5 * (theirs.max(axis=0) + theirs.min(axis=0))
         most = float(np.linalg.norm(mine - middle, axis=1).max() + np.linalg.norm(theirs - middle, axis=1).max())
         if most <= followed or not _near(x[side.nodes], x[side.other.nodes], most):
@@ -121,7 +130,7 @@ class Passing:
         return _followed(np.linalg.norm(mine[near] - beside, axis=1), gap[near], followed)
 
     def depth(self, u: Array, k: int) -> float:
-        """How far nodes of interface k that lie inside the other body are behind its surface there [m], at most."""
+        """Largest distance of nodes of interface k inside the other body from the other side's nodes [m]."""
         from scipy.spatial import cKDTree
 
         deepest, x = 0.0, self._moved(u)
@@ -136,16 +145,15 @@ class Passing:
         return deepest
 
     def unseen(self, u: Array, time: float, points: Sequence[ContactPoints], pressed: Sequence[Mask]) -> str:
-        """The deepest node that lies in another body with nothing that presses on it, in words; nothing if there is
-        none.
+        """Message about the deepest node inside another body without active contact; empty if there is none.
 
         Args:
             u: Displacement [m], shape (3N,).
-            time: Of the obstacles.
-            points: Of each interface.
-            pressed: Which of them press.
+            time: Time of the obstacles.
+            points: Contact points of each interface.
+            pressed: Mask of the active ones.
         """
-        touched = [p.weights[np.flatnonzero(some)].indices for p, some in zip(points, pressed, strict=True)]
+        touched = [p.weights[np.flatnonzero(mask)].indices for p, mask in zip(points, pressed, strict=True)]
         depth, k = self._deepest(u, time, touched)
         if depth == 0.0:
             return ""
@@ -153,18 +161,18 @@ class Passing:
         return f"{title}: bodies lie {depth:.3g} m deep in one another, and nothing parts them"
 
     def went_through(self, before: Array, u: Array, start: float, time: float) -> bool:
-        """Whether bodies lie deep in one another on the straight way between displacements (3N,) at two times."""
+        """Whether bodies lie deep in each other on the straight path between displacements (3N,) at two times."""
         share = self.share(before, u, start, time)
         count = min(int(np.ceil(_LOOKS / share)), _MOST_LOOKS) if share < 1.0 else 0
-        nothing = [np.empty(0, np.int64)] * len(self._interfaces)
+        none = [np.empty(0, np.int64)] * len(self._interfaces)
         for k in range(1, count):
             there, moment = before + k / count * (u - before), start + k / count * (time - start)
-            if self._deepest(there, moment, nothing)[0] > 0.0:
+            if self._deepest(there, moment, none)[0] > 0.0:
                 return True
         return False
 
     def _deepest(self, u: Array, time: float, touched: Sequence[Ints]) -> tuple[float, int]:
-        """How deep an untouched node lies in another body [m], and of which interface; 0 where none does."""
+        """Largest depth of an inactive node in another body [m], and the index of its interface; 0 if there is none."""
         worst, which, x = 0.0, -1, self._moved(u)
         for side in self._sides:
             if not _near(x[side.nodes], x[side.other.nodes], 0.0):
@@ -182,9 +190,10 @@ class Passing:
         return worst, which
 
     def _untouched(self, k: int, nodes: Ints32, beyond: Array, depth: Array, touched: Sequence[Ints]) -> float:
-        """The greatest depth (n,) of nodes that interface k does not touch, where it is ``beyond`` (n,) what may be."""
+        """Largest ``depth`` (n,) of inactive nodes of interface k among those whose excess over the admissible depth,
+        ``beyond`` (n,), is positive [m]."""
         offset = self._interfaces[k].pair.offset
-        # what is seen may lie inside the mesh
+        # a visible surface inside the mesh (negative offset) allows the meshes to overlap
         inside = 0.0 if offset is None else 2.0 * float(np.maximum(-offset, 0.0).max(initial=0.0))
         free = np.ones(len(self._rest), dtype=bool)
         free[touched[k]] = False
@@ -194,21 +203,21 @@ class Passing:
         return np.asarray(self._rest + u.reshape(-1, 3))
 
 
-def _followed(way: Array, gap: Array, followed: float) -> float:
-    """Share of ways (n,) past surfaces at gaps (n,) that lead no farther behind them than contact follows [m]."""
+def _followed(motion: Array, gap: Array, followed: float) -> float:
+    """Fraction of relative motions (n,) towards surfaces at gaps (n,) that end at most ``followed`` behind them [m]."""
     free = np.maximum(gap, 0.0)
-    meets = (way > free) & (way > followed)
-    return float(((free + followed) / np.maximum(way, 1e-300))[meets].min(initial=1.0))
+    meets = (motion > free) & (motion > followed)
+    return float(((free + followed) / np.maximum(motion, 1e-300))[meets].min(initial=1.0))
 
 
 def _near(points: Array, others: Array, most: float) -> bool:
-    """Whether boxes around points are within ``most`` [m]."""
+    """Whether the bounding boxes of two sets of points are closer than ``most`` [m]."""
     apart = np.maximum(points.min(axis=0) - others.max(axis=0), others.min(axis=0) - points.max(axis=0))
     return bool((apart < most).all()) if most > 0.0 else bool((apart < 0.0).all())
 
 
 def _past_itself(interface: Interface, mortar: Mortar, x: Array, step: Array) -> float:
-    """As ``_past_body``, of a body's parts past others of its own that they may meet, node to node."""
+    """As ``_past_body``, for parts of a body that may touch each other, from node to nearest node."""
     from scipy.spatial import cKDTree
 
     followed = _FOLLOWED * interface.reach
@@ -228,19 +237,23 @@ def _past_itself(interface: Interface, mortar: Mortar, x: Array, step: Array) ->
 def _past_obstacle(
     interface: Interface, obstacle: Obstacle, x: Array, step: Array, before: float, time: float
 ) -> float:
-    """As ``_past_body``, of a body past an obstacle: no farther than it is thick, either."""
+    """As ``_past_body``, for a body and an obstacle; limited by the obstacle's half thickness as well."""
     nodes = interface.slave.nodes
     times = [before + (time - before) * k / _LOOKS for k in range(_LOOKS + 1)]
-    way = way_past(obstacle, times, [x[nodes] + k / _LOOKS * step[nodes] for k in range(_LOOKS + 1)])
-    if way.max() <= min(interface.reach, _THINNEST):
+    motion = relative_paths(obstacle, times, [x[nodes] + k / _LOOKS * step[nodes] for k in range(_LOOKS + 1)])
+    if motion.max() <= min(interface.reach, _THINNEST):
         return 1.0
     gap = obstacle.project(x[nodes], before).distance
-    if (way <= gap).all():
+    if (motion <= gap).all():
         return 1.0
-    return _followed(way, gap, min(interface.reach, half_thickness(obstacle, before)))
+    return _followed(motion, gap, min(interface.reach, half_thickness(obstacle, before)))
 
 
 def guess_jumps(share: float, cut: float) -> bool:
-    """Whether a guess jumps however short the step is: the share that contact could follow hardly grew when the step
-    was cut to another share, which was 1 if it was not cut."""
+    """Whether a predictor is discontinuous: the fraction that contact can follow hardly grew although the step was cut.
+
+    Args:
+        share: Fraction of the present step that contact can follow.
+        cut: Fraction to which the step was cut before; 1 if it was not.
+    """
     return LEAST_SHARE < cut < 1.0 and share < 1.5 * cut

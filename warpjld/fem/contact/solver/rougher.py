@@ -1,4 +1,4 @@
-"""Equilibria of bodies that friction alone holds, by way of those of rougher surfaces."""
+"""Continuation in the friction coefficient, for bodies that are held by friction alone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpjld.fem.solver.krylov import SolveStatus
 __all__ = ["from_rougher"]
 
 _ROUGHER = (8.0, 2.0, 1.2, 1.0)
-"""Friction over what it is, of equilibria that lead to one that is hard to find."""
+"""Factors on the friction coefficient, in the order of the continuation."""
 
 
 def from_rougher(
@@ -27,14 +27,16 @@ def from_rougher(
     step: LoadStep,
     status: SolveStatus,
 ) -> tuple[SolveStatus, Equilibrium | None]:
-    """An equilibrium looked for from that of rougher surfaces, where all sticks that can: halving a step of a body on
-    an incline only makes the same problem smaller.
+    """Search for an equilibrium from those with larger friction, where more points stick.
+
+    Halving the load step does not help there: a body on an incline remains the same problem, only smaller.
 
     Args:
-        newton, interfaces: That look for it; their friction is as before in the end.
-        u, states: Displacement (3N,) and contact where the step begins.
-        step: The step.
-        status: Why none was found, which stays where none is found this way.
+        newton: The Newton solver.
+        interfaces: Its interfaces; their friction is restored at the end.
+        u, states: Displacement (3N,) and contact states at the start of the step.
+        step: The load step.
+        status: Status of the failed search, returned if this one fails as well.
     """
     pairs = [interface.pair for interface in interfaces]
     guess: tuple[Array, ...] = ()

@@ -1,8 +1,9 @@
-"""Whether friction could hold a body at all: forces inside the cones at its contacts that balance what pulls at it.
+"""Static feasibility: whether contact forces inside the friction cones could balance the loads on a free body.
 
-That a search finds no equilibrium does not say that there is none. Of a body that only contact holds, forces f_i at the
-contacts with |f_t| ≤ μ f_n, and any at prescribed degrees of freedom, must balance its loads in force and moment. Where
-no such forces exist, nothing can hold it. (Where they do, flesh may still not bring them about.)
+A search that finds no equilibrium does not prove that there is none. For a body held by contact alone, forces f_i at
+its contacts with |f_t| ≤ μ f_n, and arbitrary ones at prescribed degrees of freedom, have to balance its loads in force
+and moment. If there are no such forces, nothing can hold the body. (If there are, deformable bodies may still not
+develop them.)
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints
 __all__ = ["could_balance"]
 
 _EDGES = 64
-"""Edges of the pyramids around friction's cones: they hold 1.2 ‰ more than the cones do."""
+"""Edges of the pyramids circumscribed about the friction cones; they exceed the cones by 1.2 ‰."""
 _MOST = 60
-"""Points looked at; of more, evenly many of them."""
+"""Most contact points per interface; of more, an evenly spaced subset is used."""
 _BALANCED = 2e-3
-"""Force and moment left over, over the forces that pull."""
+"""Tolerance of the balance: residual force and moment (over the body's size) relative to the loads."""
 
 
 def could_balance(
@@ -36,12 +37,12 @@ def could_balance(
     """Whether forces at its contacts and supports could balance the loads on a body.
 
     Args:
-        nodes: The body's, shape (n,).
+        nodes: Nodes of the body, shape (n,).
         x: Positions of all nodes [m], shape (N, 3).
         force: Loads on all nodes [N], shape (N, 3).
-        held: Degrees of freedom that are prescribed, of any body.
-        interfaces: What may touch.
-        points: Of each, all that could press.
+        held: Prescribed degrees of freedom of all bodies.
+        interfaces: Contact interfaces.
+        points: Candidate contact points of each.
     """
     from scipy.optimize import nnls
 
@@ -85,11 +86,12 @@ def could_balance(
 
 
 def _even(rows: Ints) -> Ints:
+    """Evenly spaced subset of rows, at most ``_MOST``."""
     return rows if len(rows) <= _MOST else rows[np.linspace(0, len(rows) - 1, _MOST).astype(np.int64)]
 
 
 def _cone(normal: Array, friction: float) -> Array:
-    """Edges of a pyramid around friction's cone about a unit normal, shape (k, 3)."""
+    """Edges of the pyramid circumscribed about the friction cone of a unit normal, shape (k, 3)."""
     if friction == 0.0:
         return normal[None]
     side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])

@@ -1,9 +1,9 @@
-"""Tangent of contact: its symmetric part in the bodies' stiffness, and what a symmetric stiffness leaves out.
+"""Tangent of contact: the symmetric part, added to the bodies' stiffness, and the non-symmetric part E.
 
-The points' weights and normals change too. With pressure as high as the flesh is stiff that is no small matter: pads of
-fingers roll and slide on each other, each facet then presses on other nodes, and Newton's method without these
-derivatives goes to and fro. Both are exact: those of the weights one facet pair at a time, by numbers that carry their
-derivatives through the integrals (Puso & Laursen 2004 give them in closed form).
+E contains the derivatives of weights and normals. With pressures of the order of the flesh's modulus they matter:
+finger pads roll and slide on each other, facets then press on other nodes, and Newton's method oscillates without them.
+The derivatives are exact: those of the weights by forward-mode automatic differentiation of the integrals, one facet
+pair at a time (Puso & Laursen 2004 give them in closed form).
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ __all__ = [
 def with_contact(
     stiffness: BlockMatrix, points: list[ContactPoints], blocks: list[Array], *, threads: int
 ) -> BlockMatrix:
-    """K + Σ_a c_ai c_aj H_a in a new matrix; its pattern is K's, or wider where contact joins bodies.
+    """K + Σ_a c_ai c_aj H_a as a new matrix; its sparsity pattern is extended where contact couples bodies.
 
     Args:
         stiffness: K.
         points: Contact points of each interface.
         blocks: H of each interface's points [N/m], shape (m, 3, 3).
-        threads: Threads.
+        threads: Number of threads.
     """
     import warp as wp
     from warpjld_kernels import contact_stiffness
@@ -77,11 +77,11 @@ def with_contact(
 
 
 def _widened(stiffness: BlockMatrix, table: Any, threads: int) -> tuple[Ints32, Ints32, Array]:
-    """A copy of K with room for every pair of nodes that a row of the table joins."""
+    """A copy of K (rows, columns, values) with its pattern extended by all pairs of nodes in a row of the table."""
     import warp as wp
     from warpjld_kernels import contact_stiffness
 
-    if int(np.diff(table.indptr).max()) == 1:  # each point is a node: the diagonal
+    if int(np.diff(table.indptr).max()) == 1:  # points are single nodes: only diagonal blocks change
         return stiffness.rows, stiffness.columns, stiffness.values.copy()
     n = stiffness.size
     touched = csr_array((np.ones(len(table.indices), np.int32), table.indices, table.indptr), shape=table.shape)
@@ -110,17 +110,17 @@ def _int(values: NDArray[Any]) -> Ints32:
 
 
 _NEAR, _DEEP = 0.5, 0.05
-"""Edges within which a gap may close in an iteration; and of overlap from which on how gaps change says little of where
-to go: its facets will not meet."""
+"""Gap below which derivatives are computed, as it may close in an iteration, and penetration above which derivatives of
+the gaps are omitted, as its facets will separate; both in element edges."""
 
 
 @dataclass(frozen=True, eq=False)
 class MortarTangent:
-    """Derivatives of m points by the displacement (3N,), beyond those with weights and normals that stay.
+    """Derivatives of m points with respect to the displacement (3N,) due to changing weights and normals.
 
     Attributes:
-        gap: Of the gaps of points that touch, ``csr_array`` (m, 3N).
-        forces: Of the nodal forces, less sign: what is to be added to the stiffness [N/m], ``csr_array`` (3N, 3N).
+        gap: Derivatives of the gaps of active points, ``csr_array`` (m, 3N).
+        forces: Negative derivatives of the nodal forces, to be added to the stiffness [N/m], ``csr_array`` (3N, 3N).
     """
 
     gap: Any
@@ -136,20 +136,20 @@ def linearise_mortar(
     x: Array,
     reach: float,
 ) -> MortarTangent | None:
-    """Derivatives at positions x (N, 3), at which the points were found with the normals there; None where nothing
-    touches.
+    """Derivatives at positions x (N, 3) at which the points and normals were found; None without active points.
 
-    Tractions turn with the multipliers, not with what the penalty adds to them: overlaps of a first guess are no
-    pressure. How the friction of a point depends on its normal, and on what its slip is measured at, is left out.
+    The tractions that turn with the normals are the multipliers, without the penalty term, since overlaps of an initial
+    guess are not pressures. Derivatives of friction with respect to the normal and to the point at which slip is
+    measured are omitted.
 
     Args:
         mortar: The surfaces.
-        points: The points.
-        tractions: Theirs.
-        state: Multipliers.
+        points: Contact points.
+        tractions: Their tractions.
+        state: Contact states with the multipliers.
         penalty: ε [Pa/m], shape (m,).
-        x: [m]
-        reach: How far the points look ahead [m].
+        x: Positions of the nodes [m], shape (N, 3).
+        reach: Search distance [m].
     """
     if not tractions.active.any():
         return None
@@ -173,15 +173,15 @@ def linearise_mortar(
 
 
 def friction_coupling(points: ContactPoints, tractions: ContactTractions, friction: float, penalty: Array) -> Any:
-    """How the friction of points that slide follows their pressure, to be added to the stiffness [N/m], ``csr_array``
-    (3N, 3N); None where none slides.
+    """Negative derivatives of the friction of sliding points with respect to their pressure, to be added to the
+    stiffness [N/m], ``csr_array`` (3N, 3N); None if no point slides.
 
-    Where all points slide, what they press and what they rub is decided together: an object that is about to slip out
-    of a hand moves a long way for a small force, and taking pressure and friction in turns creeps there.
+    They matter most where all points slide: an object about to slip out of a hand moves far for a small force, and an
+    alternating iteration over pressure and friction converges slowly.
 
     Args:
-        points: The points, with their ``gap_derivative`` if it is known.
-        tractions: Theirs, friction bounded by these pressures.
+        points: Contact points, with their ``gap_derivative`` if known.
+        tractions: Their tractions, friction bounded by the pressures.
         friction: Coulomb's μ.
         penalty: ε [Pa/m], shape (m,).
     """
@@ -199,14 +199,14 @@ def friction_coupling(points: ContactPoints, tractions: ContactTractions, fricti
 
 
 class FacetPairs:
-    """Facet pairs of some points, and how their integrals change.
+    """Facet pairs of some contact points, with the derivatives of their mortar integrals.
 
     Attributes:
-        rows: The points, among m.
-        corner: Point of each corner of the slave facets, -1 for none of these, shape (P, 4).
+        rows: Indices of the points, among m.
+        corner: Point at each corner of the slave facets, -1 for none of these, shape (P, 4).
         column: Degrees of freedom of the corners, slave's first, shape (P, 24).
-        own: Derivatives of ∫ N_a N_b by them, shape (P, 24, 4, 4).
-        far: Of ∫ N_a M_b.
+        own: Derivatives of ∫ N_a N_b with respect to them, shape (P, 24, 4, 4).
+        far: Derivatives of ∫ N_a M_b, likewise.
     """
 
     def __init__(self, mortar: Mortar, points: ContactPoints, rows: Ints, x: Array, reach: float) -> None:
@@ -215,8 +215,8 @@ class FacetPairs:
         slave = mortar.slave
         number = np.full(len(slave.nodes), -1)
         number[points.sites[rows]] = rows
-        some = (number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)
-        facets, share = points.facets[some], points.share[some]
+        chosen = (number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)
+        facets, share = points.facets[chosen], points.share[chosen]
         nodes = np.concatenate([slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]], axis=1)
         self.rows = rows
         self.corner = number[slave.corners[facets[:, 0]]]
@@ -227,7 +227,7 @@ class FacetPairs:
         self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
 
     def gaps(self) -> Any:
-        """How the points' gaps change with their weights, ``csr_array`` (m, 3N)."""
+        """Derivatives of the gaps through the weights, ``csr_array`` (m, 3N)."""
         points, corner, at = self._points, self.corner, self._at
         spread = np.matmul(self.own, at[:, None, :4]) - np.matmul(self.far, at[:, None, 4:])
         off, per_area = self._mortar.sliver_offset(points.sites, points.area)
@@ -247,12 +247,12 @@ class FacetPairs:
         return csr_array(coo_array((gap[where], (row, column)), shape=(len(points.sites), self._size)))
 
     def forces(self, traction: Array) -> Any:
-        """How nodal forces of tractions (m, 3) change with the points' weights [N/m], ``csr_array`` (3N, 3N)."""
+        """Derivatives of the nodal forces of tractions (m, 3) through the weights [N/m], ``csr_array`` (3N, 3N)."""
         known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
-        some = known.any(axis=(1, 2))
-        known, column = known[some], self.column[some]
-        # by what moves, then by what is pushed
-        pushed = [np.matmul(part[some].transpose(0, 1, 3, 2), known[:, None]) for part in (self.own, -self.far)]
+        loaded = known.any(axis=(1, 2))
+        known, column = known[loaded], self.column[loaded]
+        # axes: facet pair, degree of freedom that moves, node that is loaded
+        pushed = [np.matmul(part[loaded].transpose(0, 1, 3, 2), known[:, None]) for part in (self.own, -self.far)]
         block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)
         row = np.broadcast_to(column[:, None, :], block.shape)
         column = np.broadcast_to(column[:, :, None], block.shape)
@@ -261,18 +261,18 @@ class FacetPairs:
 
 
 def normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
-    """Derivatives of the nodes' normals, ``csr_array`` (3m, 3N), zero but at ``rows``."""
+    """Derivatives of the nodal normals, ``csr_array`` (3m, 3N), zero except at ``rows``."""
     number = np.full(len(surface.nodes), -1)
     number[sites[rows]] = rows
-    some = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
-    quads, corner = surface.quads[some], number[surface.corners[some]]
-    length = np.linalg.norm(surface.at_nodes(surface.area_vectors(x)), axis=1)[surface.corners[some]]
+    faces = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
+    quads, corner = surface.quads[faces], number[surface.corners[faces]]
+    length = np.linalg.norm(surface.at_nodes(surface.area_vectors(x)), axis=1)[surface.corners[faces]]
     length = np.where(length > 0.0, length, 1.0)
     a, b, c, d = (x[quads[:, k]] for k in range(4))
-    # of (c − a) × (d − b) / 8: to each corner a quarter of the face's area vector
+    # derivatives of (c − a) × (d − b) / 8: each corner gets a quarter of the face's area vector
     along, across = cross_matrix(c - a), cross_matrix(d - b)
     each = 0.125 * np.stack([across, -along, -across, along], axis=1)  # face, node, 3, 3
-    n = surface.normals(x)[surface.corners[some]]
+    n = surface.normals(x)[surface.corners[faces]]
     plane = np.eye(3) - n[:, :, :, None] * n[:, :, None, :]
     block = np.einsum("faij,fbjk->fabik", plane, each) / length[:, :, None, None, None]
     known = np.broadcast_to((corner >= 0)[:, :, None, None, None], block.shape)
@@ -283,11 +283,11 @@ def normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Int
 
 
 def inner_rows(vectors: Array) -> Any:
-    """Rows that take the inner product of each point's vector (m, 3) with three values of it, (m, 3m)."""
+    """Block-diagonal matrix (m, 3m) of inner products with each point's vector (m, 3)."""
     count = len(vectors)
     return csr_array((vectors.ravel(), np.arange(3 * count), 3 * np.arange(count + 1)), shape=(count, 3 * count))
 
 
 def block_table(weights: Any) -> Any:
-    """A table of scalars (n, m) as one of 3 × 3 diagonal blocks."""
+    """A sparse matrix of scalars (n, m) expanded to 3 × 3 diagonal blocks, (3n, 3m)."""
     return csr_array(kron(weights, eye_array(3), format="csr"))

@@ -1,4 +1,4 @@
-"""What prescribed displacements leave to contact: bodies that nothing else holds, overlaps that it cannot part."""
+"""Bodies held by contact alone (insufficient Dirichlet conditions), and overlaps that contact cannot remove."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from warpjld.fem.solver.krylov import SolveStatus
 __all__ = ["UnconstrainedBodies", "blocked"]
 
 _HELD = (3e-2, 0.4, 1e-4)
-"""Stiffness given to bodies that only contact holds, over their own: it slows them down, and leaves no force. At first,
-so that contact is found before they fly off; by which factor it then falls with each iteration; and the least.
-"""
+"""Artificial stiffness of bodies held by contact alone, relative to their own; it limits steps and causes no force.
+First value (large enough to find contact), factor per iteration, and smallest value."""
 _GRASPED = 1e-4
-"""Least stiffness against a motion as a whole, over the most, from which contact is taken to resist all of them."""
+"""Smallest over largest eigenvalue of the contact stiffness on rigid motions above which contact resists all
+motions."""
 
 
 class UnconstrainedBodies:
-    """The bodies that prescribed displacements do not hold.
+    """Bodies whose Dirichlet conditions leave rigid motions free.
 
     Args:
         body: All bodies, merged.
-        prescribed: Known displacements.
+        prescribed: Dirichlet conditions.
         stiffness: Stiffness of each node [N/m], shape (N,).
     """
 
@@ -46,7 +46,7 @@ class UnconstrainedBodies:
         return bool(self._bodies)
 
     def falling(self, contact: ContactForces) -> Mask:
-        """Nodes of unconstrained bodies that nothing touches, shape (N,)."""
+        """Mask of the nodes of unconstrained bodies without active contact, shape (N,)."""
         out = np.zeros(len(self._mesh.nodes), dtype=bool)
         if self._bodies:
             touched = np.zeros(len(out), dtype=bool)
@@ -57,7 +57,7 @@ class UnconstrainedBodies:
         return out
 
     def failure(self, interfaces: list[Interface], contact: ContactForces) -> tuple[SolveStatus, str]:
-        """Why no equilibrium was found: such a body that nothing touches, or that slides wherever it is touched."""
+        """Reason for a failure: an unconstrained body without contact, or one that slides at all its contacts."""
         for nodes, held in zip(self._bodies, self._held, strict=True):
             mine = np.zeros(len(self._mesh.nodes), dtype=bool)
             mine[nodes] = True
@@ -81,17 +81,17 @@ class UnconstrainedBodies:
         return SolveStatus.MAX_ITERATIONS, ""
 
     def within(self, move: Array, reach: float) -> float:
-        """Share of a move (3N,) by which unconstrained bodies go no farther than ``reach`` [m]."""
+        """Fraction of a move (3N,) in which no node of an unconstrained body moves farther than ``reach`` [m]."""
         far = max((float(np.abs(move.reshape(-1, 3)[nodes]).max()) for nodes in self._bodies), default=0.0)
         return min(1.0, reach / far) if far > 0.0 else 1.0
 
     def grasped(self, contact: ContactForces) -> bool:
-        """Whether contact resists every motion of theirs as a whole: more stiffness would only slow them down."""
+        """Whether contact resists all their rigid motions, so that no artificial stiffness is needed."""
         count = sum(modes.shape[2] for _, modes in self._modes)
         stiffness = np.zeros((count, count))
         for p, t in zip(contact.points, contact.tractions, strict=True):
             rows = np.flatnonzero(t.active)
-            moved = []  # of the points, by each motion of each body
+            moved = []  # displacements of the points by each rigid mode of each body
             for nodes, modes in self._modes:
                 there = p.weights[rows][:, nodes] @ modes.reshape(len(nodes), -1)
                 moved.append(there.reshape(len(rows), 3, modes.shape[2]))
@@ -101,7 +101,7 @@ class UnconstrainedBodies:
         return bool(resisted[0] > _GRASPED * resisted[-1] > 0.0)
 
     def steadied(self, matrix: BlockMatrix, turn: int) -> BlockMatrix:
-        """A matrix that holds unconstrained bodies back, less with every turn."""
+        """The matrix with the artificial stiffness of an iteration added at unconstrained bodies."""
         if not self._bodies:
             return matrix
         first, falls, least = _HELD
@@ -120,14 +120,14 @@ def blocked(
     *,
     allowed: float,
 ) -> str:
-    """The deepest overlap between sides that are both prescribed, in words; nothing where there is none.
+    """Message about the deepest overlap between two prescribed sides; empty if there is none.
 
     Args:
-        interfaces: What may touch.
-        points: Of each, where prescribed displacements are in place.
-        states: Of each: overlap that is still allowed, and bonds.
-        free: Degrees of freedom, shape (3N,).
-        allowed: Share of the states' allowance that still counts.
+        interfaces: Contact interfaces.
+        points: Their contact points, with the Dirichlet values applied.
+        states: Their states, with allowances and bonds.
+        free: Mask of free degrees of freedom, shape (3N,).
+        allowed: Fraction of the allowances that still counts.
     """
     worst, words = 0.0, ""
     for interface, p, s in zip(interfaces, points, states, strict=True):
