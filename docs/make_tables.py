@@ -29,7 +29,7 @@ _RESULTS = {
     "batch.deform": ["ClipFiles"],
     "baking.baked": ["Baked"],
     "grasp.close_hand": ["ClosedHand"],
-    "grasp.auto": ["AutoGrasp"],
+    "grasp.find_grasp": ["AutoGrasp"],
     "grasp.judge": ["Verdict"],
     "simulation.simulate": ["Simulation"],
     "simulation.report.verdict": ["ContactVerdict"],

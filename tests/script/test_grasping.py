@@ -10,8 +10,8 @@ from warpjld.errors import InputError
 from warpjld.geometry.normals import vertex_normals
 from warpjld.grasp import ObjectSet, SearchStatus
 from warpjld.grasp.digits import pad_vertex
-from warpjld.grasp.draws import WAY
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
+from warpjld.grasp.random_placements import WAY
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
 from warpjld.script.props import prop_places

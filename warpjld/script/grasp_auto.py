@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from warpjld.covering import Covering
     from warpjld.grasp import GraspObject
-    from warpjld.grasp.auto import AutoGrasp
     from warpjld.grasp.close import Closer
+    from warpjld.grasp.find_grasp import AutoGrasp
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
@@ -39,8 +39,8 @@ def grasp_by_itself(
     Raises:
         InputError: Nothing was found.
     """
-    from warpjld.grasp.auto import find_grasp
     from warpjld.grasp.close import Closer
+    from warpjld.grasp.find_grasp import find_grasp
     from warpjld.grasp.intersection import intersection
 
     if actor.recorded is not None:
@@ -95,7 +95,7 @@ def carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, flo
     """Move a hand as a whole: away from the object, to it, and stay."""
     from scipy.spatial.transform import Rotation
 
-    from warpjld.grasp.draws import WAY
+    from warpjld.grasp.random_placements import WAY
     from warpjld.motion import Key
 
     away = found.position - WAY * found.approach

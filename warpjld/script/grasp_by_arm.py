@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.grasp.arm_clearance import ArmClearance
-from warpjld.grasp.auto import AutoGrasp, find_grasp
-from warpjld.grasp.draws import WAY
+from warpjld.grasp.find_grasp import AutoGrasp, find_grasp
+from warpjld.grasp.random_placements import WAY
 from warpjld.script.grasping import posture
 from warpjld.script.reaching import REACHED, arm_to_hand
 from warpjld.skeleton.arm import Arm, arm_of

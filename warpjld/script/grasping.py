@@ -16,7 +16,7 @@ from warpjld.script.staging import stage
 from warpjld.skeleton import Poses
 
 if TYPE_CHECKING:
-    from warpjld.grasp import Found, GraspObject
+    from warpjld.grasp import GraspObject, SearchResult
     from warpjld.script.crowd import Crowd
     from warpjld.script.facets import Facet
     from warpjld.script.props import Prop
@@ -86,7 +86,7 @@ def search_flexion(
     facet: Facet | None,
     distance: float,
     within: float,
-) -> tuple[Found, str]:
+) -> tuple[SearchResult, str]:
     """The flexion of a joint, nearest to where it is, at which a vertex is so far from an object at a key, and what it
     does not solve (R77)."""
     from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Searches

@@ -15,10 +15,10 @@ from warpjld.covering.kept import bind_kept
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
 from warpjld.grasp.close import Closer
-from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.palm import Palm, palm_of
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.segments import vertex_segments
+from warpjld.grasp.subdivided_skin import FinerSkin
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice

@@ -28,8 +28,8 @@ class WristRange:
         tilt: Angle between the palm's normal and the direction of approach [°].
         gap: Distance from palm to object along the approach [m].
         offset: How far beside the object's centre the palm aims, as a share of the object's half extent.
-        best_of: 0 draws one placement from these ranges; n takes the best of n as `warpjld.grasp.auto.find_grasp` (the
-            script's GRASP … AUTO) finds it, and the ranges say nothing.
+        best_of: 0 draws one placement from these ranges; n takes the best grasp of n placements of
+            `warpjld.grasp.find_grasp.find_grasp` (the script's GRASP … AUTO), and the ranges are not used.
     """
 
     elevation: tuple[float, float] = (-90.0, 90.0)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.close import Closer
+from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.postures import posture_for
