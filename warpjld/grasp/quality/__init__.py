@@ -1,8 +1,7 @@
 """Grasp quality metrics, one per file, each with its formula and its source.
 
 All but `penetration`, `self_penetration` and `contact_map` take plain arrays or a `Contacts` set, so that grasps from
-other programs can be judged too. docs/explanation/metrics.md lists them and says how to add
-one.
+other programs can be judged too. docs/explanation/metrics.md lists them and says how to add one.
 """
 
 from warpjld.grasp.quality.closure import Closure, force_closure
