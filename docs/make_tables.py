@@ -1,6 +1,6 @@
-"""The pages that follow from the code: tables' columns, written where `tables.md` asks for them, and the API's names.
+"""Write the pages that are made from the code: tables of columns, between the marks of a page, and the API's names.
 
-python docs/make_tables.py             # a test says when it is due
+python docs/make_tables.py             # a test fails when a page is out of date
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _RESULTS = {
     "batch.deform": ["ClipFiles"],
     "baking.baked": ["Baked"],
     "grasp.close_hand": ["ClosedHand"],
-    "grasp.auto": ["AutoGrasp"],
+    "grasp.find_grasp": ["AutoGrasp"],
     "grasp.judge": ["Verdict"],
     "simulation.simulate": ["Simulation"],
     "simulation.report.verdict": ["ContactVerdict"],
@@ -37,11 +37,11 @@ _RESULTS = {
     "study.run": ["StudyResult"],
     "study.rerun": ["Rerun"],
 }
-"""What functions return: to read, not to make."""
+"""Types that functions return and callers only read."""
 
 
 def tables() -> dict[str, str]:
-    """Tables of columns by the name of their place in the page."""
+    """Tables of columns, by the name of their marks in a page."""
     from warpjld.simulation.report.tactile_files import TACTILE_COLUMNS
     from warpjld.study.columns import COMMON_COLUMNS
     from warpjld.study.grasping.columns import GRASP_COLUMNS
@@ -55,22 +55,22 @@ def _table(columns: tuple) -> str:
 
 
 def filled(text: str, parts: dict[str, str]) -> str:
-    """A page with what stands between its marks replaced."""
+    """A page with the text between its marks replaced."""
     for name, part in parts.items():
         pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.S)
         text, count = pattern.subn(lambda match, part=part: f"{match[1]}{part}\n{match[2]}", text)
-        assert count == 1, f"no place for {name}"
+        assert count == 1, f"no marks for {name}"
     return text
 
 
 def api() -> str:
-    """The page of the library's names."""
+    """Page of the public names of the library."""
     source = Path(wj.__file__).read_text(encoding="utf-8")
     source = source[source.index("_WHERE = {") : source.index("_MODULES = {")]
     lines = [
         "# Names of the library",
         "",
-        "`import warpjld as wj`: these are all; what lies in modules besides is how it is done, and may change.",
+        "`import warpjld as wj`: these are all public names. Anything else in the modules may change.",
         "Angles are radians, lengths metres, forces newtons, pressures pascals; arrays are (frames, …); Y is up.",
         "`warpjld.fem` (finite elements), `warpjld.render` (pictures) and `warpjld.shapes` (objects) are modules.",
     ]
@@ -101,9 +101,14 @@ def _entry(path: str, found: object) -> list[str]:
 
 
 def pages() -> dict[Path, str]:
-    """What every page made here should hold."""
-    columns = REFERENCE / "tables.md"
-    return {columns: filled(columns.read_text(encoding="utf-8"), tables()), REFERENCE / "api.md": api()}
+    """Text of every page made here, by path."""
+    columns, study = REFERENCE / "tables.md", REFERENCE / "grasp-study.md"
+    parts = tables()
+    return {
+        columns: filled(columns.read_text(encoding="utf-8"), parts),
+        study: filled(study.read_text(encoding="utf-8"), {"study": parts["study"]}),
+        REFERENCE / "api.md": api(),
+    }
 
 
 if __name__ == "__main__":

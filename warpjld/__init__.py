@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from warpjld.covering.gradient import Differentiable
     from warpjld.errors import InputError, MissingExtraError, WarpjldError
     from warpjld.grasp import GraspObject, load_object, make_object, shapes
-    from warpjld.grasp.auto import find_grasp
     from warpjld.grasp.close_hand import close_hand
+    from warpjld.grasp.find_grasp import find_grasp
     from warpjld.grasp.judge import judge
     from warpjld.hand import build_hand
     from warpjld.hand.figure import build_body
@@ -82,7 +82,7 @@ _WHERE = {
     "make_object": "grasp",
     "GraspObject": "grasp",
     "close_hand": "grasp.close_hand",
-    "find_grasp": "grasp.auto",
+    "find_grasp": "grasp.find_grasp",
     "judge": "grasp.judge",
     # contact
     "simulate": "simulation.simulate",

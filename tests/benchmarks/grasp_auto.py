@@ -22,7 +22,7 @@ import numpy as np
 from warpjld.covering import Covering, bind
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, load_object, make_object
-from warpjld.grasp.auto import find_grasp
+from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.shapes import SHAPES, box
 from warpjld.hand import build_hand
 from warpjld.io import load_rig

@@ -26,12 +26,12 @@ from rich.table import Table
 
 from warpjld.covering import Covering, bind
 from warpjld.grasp import GraspObject
-from warpjld.grasp.auto import _promising
 from warpjld.grasp.close import Closer
-from warpjld.grasp.draws import Draws
+from warpjld.grasp.find_grasp import _promising
 from warpjld.grasp.judge import Judge, Verdict
 from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.placements import Candidates
+from warpjld.grasp.random_placements import Draws
 from warpjld.grasp.shapes import ball, box, cylinder, glass
 from warpjld.hand import build_hand
 from warpjld.runtime.quiet import silence_warp

@@ -157,8 +157,8 @@ def test_a_batch_goes_on_past_a_clip_that_fails_and_says_so(place: Path, capsys:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("curl.csv", "other.csv", "-o", "out"), "2 clips: say by --format"),
-        (("-o", "out"), "want a motion file behind RIG"),
+        (("curl.csv", "other.csv", "-o", "out"), "2 clips: want --format"),
+        (("-o", "out"), "want a motion file after RIG"),
         (("*.bvh", "-o", "out", "--format", "pc2"), "no file fits the pattern '*.bvh'"),
         (("curl.csv", "-o", "curl.csv", "--format", "pc2"), "is a file; want a folder"),
     ],

@@ -67,7 +67,7 @@ def test_files_are_copied_and_none_is_taken_the_place_of(tmp_path, capsys) -> No
     assert run("user_command", "--copy", "-o", str(tmp_path)) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"user_command.jld", "user_command.py"}
     assert run("user_command", "--copy", "-o", str(tmp_path)) == 1
-    assert "is there already" in capsys.readouterr().err
+    assert "exists already" in capsys.readouterr().err
 
 
 def test_a_misspelt_name(capsys) -> None:

@@ -82,7 +82,7 @@ def test_undo_takes_the_last_line_back(session) -> None:
     for line in (HAND, "WRIST LEFT FLEXION AT 0 10", "WRIST LEFT FLEXION AT 5 20", "PRINT x"):
         session.type(line)
     session.type("undo")
-    assert session.said[-1] == "forgotten: WRIST LEFT FLEXION AT 5 20"
+    assert session.said[-1] == "undone: WRIST LEFT FLEXION AT 5 20"
     assert session.scene.actor().key_frames == [0]
     assert session.said.count("x") == 1
 
@@ -107,7 +107,7 @@ def test_what_was_typed_can_be_saved_and_run(session, tmp_path) -> None:
 def test_quit(session) -> None:
     assert session.type("PRINT 1")
     assert not session.type("quit")
-    with pytest.raises(InputError, match="RUN stands alone"):
+    with pytest.raises(InputError, match="RUN takes no arguments"):
         session.type("RUN 3")
 
 

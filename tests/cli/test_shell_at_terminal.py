@@ -43,7 +43,7 @@ def session(tmp_path: Path) -> Session:
 @pytest.mark.parametrize(
     ("error", "told"),
     [
-        (KeyboardInterrupt(), "stopped; what was typed before is as it was"),
+        (KeyboardInterrupt(), "stopped; the effects of this line are undone"),
         (InputError("no such thing"), "error: no such thing"),
         (ZeroDivisionError("x"), "unexpected ZeroDivisionError: x; the lines typed so far are in"),
         (SystemExit(3), "unexpected SystemExit: 3; the lines typed so far are in"),

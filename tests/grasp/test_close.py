@@ -10,8 +10,8 @@ from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains, pad_vertex
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.intersection import contacts, intersection, part_vertices
+from warpjld.grasp.keep_apart import keep_apart
 from warpjld.grasp.posed_skins import PosedSkins
-from warpjld.grasp.separate import keep_apart
 from warpjld.grasp.shapes import ball, box, cylinder
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 

@@ -6,13 +6,13 @@ import pytest
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.close import Closer
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.give_way import give_way
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.intersection import contacts
 from warpjld.grasp.outline_points import outline_points
 from warpjld.grasp.quality import vertex_areas
 from warpjld.grasp.shapes import ball, box
+from warpjld.grasp.subdivided_skin import FinerSkin
 from warpjld.skeleton import CHANNELS, poses_from_angles
 
 

@@ -110,7 +110,7 @@ def stacked(*, lids: int, turned: slice = slice(0)) -> GraspObject:
 def test_closed_pieces_that_share_a_ring_are_told_apart(turned: slice) -> None:
     thing = stacked(lids=2, turned=turned)
     assert thing.volume == pytest.approx(2.0)
-    assert (thing.report.components, thing.report.open_edges, thing.report.crowded) == (2, 0, 4)
+    assert (thing.report.components, thing.report.open_edges, thing.report.non_manifold) == (2, 0, 4)
     assert not thing.report.solid
     assert "4 edges belong to more than two triangles" in "; ".join(thing.report.notes())
     points = np.random.default_rng(0).uniform(-0.5, 2.5, size=(200, 3))
@@ -120,7 +120,7 @@ def test_closed_pieces_that_share_a_ring_are_told_apart(turned: slice) -> None:
 
 def test_a_wall_inside_leaves_open_edges() -> None:
     thing = stacked(lids=1)
-    assert (thing.report.components, thing.report.open_edges, thing.report.crowded) == (2, 4, 4)
+    assert (thing.report.components, thing.report.open_edges, thing.report.non_manifold) == (2, 4, 4)
     assert thing.volume == pytest.approx(2.0)
     notes = "; ".join(thing.report.notes())
     assert "4 open edges" in notes
@@ -130,7 +130,7 @@ def test_a_wall_inside_leaves_open_edges() -> None:
 def test_three_sheets_on_an_edge_are_told() -> None:
     vertices = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0.0]])
     report = make_object("sheets", vertices, np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])).report
-    assert report.crowded == 1
+    assert report.non_manifold == 1
     assert not report.solid
 
 
@@ -139,7 +139,7 @@ def test_overlapping_pieces_are_told() -> None:
     thing = make_object("two", vertices, np.concatenate([CUBE.faces, CUBE.faces + 8]))
     assert thing.report.crossing > 0
     assert not thing.report.solid
-    assert "cross others" in thing.report.notes()[0]
+    assert "intersect others" in thing.report.notes()[0]
 
 
 @pytest.mark.parametrize(

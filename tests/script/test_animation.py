@@ -101,7 +101,7 @@ def test_any_joint_by_name_or_by_the_papers_number(run, joint: str) -> None:
         ("FINGER23 LEFT INDEX KNUCKLES4 0 20 10 45", "1:21", "did you mean KNUCKLES"),
         ("METACARPUS LEFT 0 20 10 21", "1:25", "goes from 0° to 20°"),
         ("ELBOW LEFT FLEXION 0 20 10 5", "1:1", "actor LEFT has no joint left.elbow"),
-        ("FINGER1 RIGHT INDEX FLEXION 0 20 10 45", "1:1", "no actor has a right side; bring one on with HAND RIGHT"),
+        ("FINGER1 RIGHT INDEX FLEXION 0 20 10 45", "1:1", "no actor has a right side; add one with HAND RIGHT"),
         ("JOINT index.nuckle2 FLEXION AT 1 30", "1:7", "did you mean index.knuckle2"),
         ("JOINT 18 FLEXION AT 1 30", "1:7", "17 or less"),
         ("JOINT index.carpometacarpal FLEXION AT 1 3", "1:42", "left.index.carpometacarpal has no flexion"),

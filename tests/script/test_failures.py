@@ -33,7 +33,7 @@ def test_the_rest_is_published_and_the_failure_named(tmp_path: Path, monkeypatch
     monkeypatch.setattr(NpzCache, "_append", full)
     scene = scene_of(tmp_path, 'EXPORT "a.npz"', 'EXPORT "a.mdd"', 'PICTURE 1 "p.png"', 'EXPORT_MOTION "a.bvh"')
     out = tmp_path / "out"
-    with pytest.raises(WarpjldError, match=r"not made: 'a\.npz': .*No space left.*; all else .* is in .*out"):
+    with pytest.raises(WarpjldError, match=r"not made: 'a\.npz': .*No space left.*; all other outputs are in .*out"):
         run_scene(scene, out)
     assert sorted(file.name for file in out.iterdir()) == ["a.bvh", "a.mdd", "a.rest.obj", "p.png", "summary.json"]
     assert list(json.loads((out / "summary.json").read_text())["failed"]) == ["a.npz"]

@@ -10,8 +10,8 @@ from warpjld.errors import InputError
 from warpjld.geometry.normals import vertex_normals
 from warpjld.grasp import ObjectSet, SearchStatus
 from warpjld.grasp.digits import pad_vertex
-from warpjld.grasp.draws import WAY
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
+from warpjld.grasp.random_placements import WAY
 from warpjld.script.binding import cover
 from warpjld.script.grasping import placed_at, posture
 from warpjld.script.props import prop_places
@@ -169,7 +169,7 @@ def test_the_summary_tells_objects_searches_and_contacts(run, tmp_path: Path) ->
         ("OBJECT a BALL COLOR 'gren'", r"there is no colour 'gren'; did you mean green\?"),
         ("OBJECT left BALL", "there is an object or actor LEFT already"),
         ("OBJECT apple BALL\nOBJECT apple BOX", "there is an object or actor APPLE already"),
-        ("OBJECTS apple INDEX LEFT KNUCKLES2 5 10", "no object apple; bring one on"),
+        ("OBJECTS apple INDEX LEFT KNUCKLES2 5 10", "no object apple; add one"),
         ("OBJECT apple BALL\nOBJECTS aple INDEX LEFT KNUCKLES2 5 10", "did you mean APPLE"),
         ("OBJECT a BALL\nOBJECTS a INDEX LEFT KNUCKLES2 10 5", "must not come before"),
         ("OBJECT a BALL\nOBJECTS a JOINT wrist 1 5\nOBJECTS a JOINT index.base 4 6", "follows another joint"),

@@ -29,7 +29,7 @@ def test_arithmetic_has_the_usual_order(run) -> None:
     ("text", "says"),
     [
         ("PRINT (1 / 0)", "<script>:1:8: division by zero"),
-        ("PRINT $x", "<script>:1:7: $X has a meaning only inside a macro"),
+        ("PRINT $x", "<script>:1:7: $X is only defined inside a macro"),
         ("MACRO a size\nPRINT $sise\nEND", "<script>:2:7: $SISE is not a parameter of A; did you mean SIZE?"),
         ('MACRO a b\nPRINT "$c"\nEND', "<script>:2:7: $C is not a parameter"),
         ("MACRO a b b\nPRINT\nEND", "<script>:1:11: two parameters are called b"),

@@ -69,9 +69,7 @@ def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_p
     assert summary["press"]["status"] == "BLOCKED"
     assert "mm inside PLATE, which cannot give way" in summary["press"]["verdict"]
     assert (tmp_path / "e.npz").is_file()  # what can be made is
-    assert summary["failed"]["p.png"].startswith(
-        "contact was solved at no frame: nothing is known of pressure at frame 4"
-    )
+    assert summary["failed"]["p.png"].startswith("contact was solved at no frame: there is no pressure at frame 4")
 
 
 def test_what_has_stopped_is_kept_for_a_run_that_goes_on() -> None:

@@ -118,7 +118,7 @@ def test_a_machine_whose_bits_differ_is_refused(tmp_path: Path) -> None:
         run_study(Dice(trials=12), tmp_path, table="csv", ray="local")
     result = run_study(Dice(trials=12), tmp_path, table="csv", ray="local", allow_mixed=True)
     assert result.ran == 3
-    assert "trial 4 gives other bits than elsewhere; it takes part all the same" in result.notes[0]
+    assert "trial 4 gives other bits than elsewhere; it is used nevertheless" in result.notes[0]
     assert _manifest(tmp_path)["cluster"]["nodes"][0]["why"] == "trial 4 gives other bits than elsewhere"
 
 

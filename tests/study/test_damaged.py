@@ -52,7 +52,7 @@ def test_a_damaged_study_file_sets_the_trials_aside(tmp_path: Path, content: str
     (tmp_path / "study.json").write_text(content)
     again = run_study(Dice(trials=3), tmp_path, processes=1, table="csv")
     assert again.ran == 3
-    assert "study.json is damaged: what was there is in" in again.notes[0]
+    assert "study.json is damaged: the old trials are in" in again.notes[0]
     assert len(list((tmp_path / "trials.unknown1").rglob("*.json"))) == 3
     assert (tmp_path / "table.csv").read_bytes() == before
 

@@ -177,7 +177,7 @@ def test_bad_arguments_are_named(tmp_path: Path) -> None:
         run_study(Dice(trials=1), tmp_path, processes=0, table="csv")
     with pytest.raises(InputError, match="table"):
         run_study(Dice(trials=1), tmp_path, table="xlsx")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="holds no study"):
+    with pytest.raises(InputError, match="there is no study in this folder"):
         rerun_trial(Dice(trials=1), tmp_path, 0)
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="is a file; want a folder"):

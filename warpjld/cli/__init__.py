@@ -1,4 +1,4 @@
-"""The command line: one file per command, loaded when it is called."""
+"""The command line interface: one file per command, imported when the command is called."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ _TRACEBACK = "WARPJLD_TRACEBACK"
 
 _COMMANDS = {
     "run": "Run a script: animation, grasping, contact; pictures, films, exports.",
-    "shell": "Type a script's commands one by one and look at the result.",
-    "studio": "Pose, key, grasp and press in the browser, and see it.",
+    "shell": "Type the commands of scripts one by one, with immediate results.",
+    "studio": "Edit a script in the browser, with a 3D view: pose, set keys, grasp, press.",
     "example": "List, run or copy the examples that come with the package.",
     "inspect": "Report what was recognised in a rig.",
-    "place": "Propose the named points of a body or hand in a bare surface.",
+    "place": "Propose the named points of a body or hand for a surface without joints.",
     "calibrate": "Fit the covering's parameters to a rig.",
-    "bind": "Bind a rig once and keep the binding in a file.",
+    "bind": "Bind a rig once and save the binding to a file.",
     "deform": "Deform a rig by a motion file.",
-    "bake": "Write a rig for engines: fitted skin weights and corrective shapes.",
-    "study": "Run many grasps and bring them into one table.",
-    "score": "Judge grasps of others by the same measures.",
+    "bake": "Write a rig for game engines: fitted skin weights and corrective shapes.",
+    "study": "Run many grasps and collect them in one table.",
+    "score": "Measure grasps of other programs by the same metrics.",
     "fem": "Load a deformable body and solve for its shape, stresses and reactions.",
-    "doctor": "Say what is installed, what works here, and what is missing.",
+    "doctor": "Report what is installed, what works here, and what is missing.",
 }
-_HELP = """Metres, degrees, newtons and pascals everywhere. HELP in the shell, or `echo HELP | warpjld shell`, lists
-what scripts understand."""
+_HELP = """All lengths are metres, angles degrees, forces newtons, pressures pascals. HELP in the shell, or
+`echo HELP | warpjld shell`, lists the commands of scripts."""
 
 
 class _Lazy(click.Group):
-    """Loads ``NAME_command`` of ``warpjld.cli.NAME`` only for the command that is called: start-up stays short."""
+    """Command group that imports ``warpjld.cli.NAME`` only when NAME is called, for a short start-up."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
@@ -67,7 +67,7 @@ class _Lazy(click.Group):
 
 
 def _limits() -> str:
-    return "; ".join(f"{name} {one.most:,}" for name, one in LIMITS.items())
+    return "; ".join(f"{name} {bound.most:,}" for name, bound in LIMITS.items())
 
 
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]}, epilog=_HELP)
@@ -81,20 +81,20 @@ def _limits() -> str:
 )
 def command_group(limits: tuple[str, ...]) -> None:
     """Hands and bodies deformed by Joint-dependent Local Deformations, without painted weights."""
-    for one in limits:
-        name, _, value = one.partition("=")
+    for assignment in limits:
+        name, _, value = assignment.partition("=")
         set_limit(name.strip(), value)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line.
 
-    Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 70 a fault of the program's own, 130 interrupted.
+    Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 70 a bug in the program, 130 interrupted.
     """
-    # a polite kill cleans up as Ctrl-C does, and keeps what is finished
+    # SIGTERM cleans up as Ctrl-C does, and keeps finished results
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
+        sys.stdout.reconfigure(errors="backslashreplace")  # file names may not be valid text
     try:
         code = command_group.main(arguments, prog_name="warpjld", standalone_mode=False)
     except click.exceptions.Abort:
@@ -109,7 +109,7 @@ def main(arguments: list[str] | None = None) -> None:
     except WarpjldError as error:
         click.echo(f"error: {one_line(str(error))}", err=True)
         sys.exit(1)
-    except OSError as error:  # a full disk, a folder that went away: nothing a traceback would tell more of
+    except OSError as error:  # a full disk, a folder that was removed: a traceback would add nothing
         what = f"{error.filename or 'a file'}: {error.strerror or error}"
         click.echo(f"error: {one_line(what)}", err=True)
         sys.exit(1)
@@ -125,10 +125,10 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _unexpected(error: Exception) -> str:
-    """One line on an error that nobody foresaw: what, and where it came up."""
+    """One line about an unexpected exception: what it is and where it was raised."""
     frames = traceback.extract_tb(error.__traceback__)
     where = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""
     return one_line(
-        f"unexpected {type(error).__name__}{where}: {error} (a fault of warpjld: please report it; with "
-        f"{_TRACEBACK}=1 set the same command shows where it came from)"
+        f"unexpected {type(error).__name__}{where}: {error} (a bug in warpjld, please report it; with "
+        f"{_TRACEBACK}=1 set the same command shows the traceback)"
     )

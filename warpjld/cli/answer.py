@@ -1,4 +1,4 @@
-"""What a command answers a program with: one JSON object, alone on stdout."""
+"""Output of ``--json``: one JSON object on stdout."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["answer"]
 
 
 def answer(result: Mapping[str, Any]) -> None:
-    """Write a result to stdout as JSON, in ASCII whatever the terminal speaks; numbers that are not finite are null."""
+    """Write a result to stdout as ASCII JSON; numbers that are not finite become null."""
     click.echo(json.dumps(_finite(result), indent=1, allow_nan=False))
 
 
@@ -21,7 +21,7 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_finite(one) for one in value]
+        return [_finite(item) for item in value]
     return value

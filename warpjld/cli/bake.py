@@ -1,4 +1,4 @@
-"""``warpjld bake``: skin weights and corrective shapes that engines play, fitted to the covering."""
+"""``warpjld bake``: skin weights and corrective shapes for game engines, fitted to the covering."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["bake_command"]
     "--out",
     type=click.Path(path_type=Path, dir_okay=False),
     required=True,
-    help="File to write: .glb, .usd, .usda or .usdc; what drives correctives goes to NAME.correctives.json beside it.",
+    help="File to write: .glb, .usd, .usda or .usdc; the drivers of correctives are written to NAME.correctives.json.",
 )
 @options.rig
 @click.option(
@@ -32,16 +32,20 @@ __all__ = ["bake_command"]
     "motions",
     multiple=True,
     type=click.Path(path_type=Path),
-    help="Motion to fit to besides the range of motion; its last quarter is kept for the report. Repeatable.",
+    help="Motion to fit to, in addition to the range of motion; its last quarter is used for the report. Repeatable.",
 )
 @click.option(
-    "--influences", type=click.Choice(["4", "8"]), default="4", show_default=True, help="Most joints a vertex."
+    "--influences",
+    type=click.Choice(["4", "8"]),
+    default="4",
+    show_default=True,
+    help="Largest number of joints per vertex.",
 )
 @click.option(
-    "--correctives", type=click.IntRange(0, 128), default=0, show_default=True, help="How many corrective shapes."
+    "--correctives", type=click.IntRange(0, 128), default=0, show_default=True, help="Number of corrective shapes."
 )
 @click.option(
-    "--clip", type=click.Path(path_type=Path), help="Motion to animate the file by, with the shapes' weights."
+    "--clip", type=click.Path(path_type=Path), help="Motion to include as an animation, with the shapes' weights."
 )
 @click.option(
     "--report",
@@ -67,8 +71,8 @@ def bake_command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Fit skin weights, and corrective shapes driven by joint rotations, to what the covering does with RIG, and write
-    a file that engines play: RIG's own joints and bind pose, a skin, morph targets.
+    """Fit skin weights, and corrective shapes driven by joint rotations, to RIG's covering, and write a file for game
+    engines: RIG's own joints and bind pose, a skin, morph targets.
 
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd, .usda, .usdc, .usdz), a surface with --skeleton, or builtin:left,
     builtin:right."""
@@ -102,7 +106,7 @@ def bake_command(
     shown = None if clip is None else load_motion(clip, opened)
     warnings = [line for motion in (*loaded, *([shown] if shown else [])) for line in motion.warnings]
     if opened.skin is None:
-        warnings.append("the rig has no painted weights: the report has nothing to set the fitted ones beside")
+        warnings.append("the rig has no painted weights: the report cannot compare the fitted ones with any")
     with progress(quiet) as report:
         covering, _ = bind_kept(opened, parameters=chosen, domains=domains)
         fitted, unseen = with_motions(opened.skeleton, [motion.poses for motion in loaded])
@@ -137,7 +141,7 @@ def _print(told: dict[str, Any], rows: list[Accuracy]) -> None:
 
 
 def _table(rows: list[Accuracy], fitted: int) -> None:
-    click.echo(f"fitted to {fitted} poses; on others, mm from the covering (root of the mean square / largest):")
+    click.echo(f"fitted to {fitted} poses; on others, distance from the covering in mm (RMS / largest):")
     click.echo(f"{'':14}{'painted':>16}{'weights':>16}{'with shapes':>16}")
     for row in rows:
         cells = (

@@ -1,4 +1,4 @@
-"""``warpjld bind``: a rig bound once, kept in a file for whoever deforms it."""
+"""``warpjld bind``: bind a rig and save the binding to a file."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def bind_command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Bind RIG and keep the binding in a file, for deform --binding with the same options.
+    """Bind RIG and save the binding to a file, for deform --binding with the same options.
 
-    Without such files bindings are kept in the user's cache folder; WARPJLD_CACHE names another one, or is off."""
+    Without such a file, bindings are kept in the user's cache folder; WARPJLD_CACHE names another one, or is off."""
     from warpjld.cli.rig_argument import open_rig, rig_files
     from warpjld.covering import bind_rig, load_parameters
     from warpjld.covering.kept import save_binding

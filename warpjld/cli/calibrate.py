@@ -1,4 +1,4 @@
-"""``warpjld calibrate``: fit the covering's parameters to a rig, or to shapes that it shall have."""
+"""``warpjld calibrate``: fit the covering's parameters to a rig, or to target shapes."""
 
 from __future__ import annotations
 
@@ -43,22 +43,26 @@ _ROWS = {
 )
 @options.rig
 @click.option(
-    "--start", type=click.Path(path_type=Path, dir_okay=False), help="Parameter file to begin with; else the defaults."
+    "--start", type=click.Path(path_type=Path, dir_okay=False), help="Parameter file to start from; else the defaults."
 )
 @options.domains
-@click.option("--poses", type=click.IntRange(min=1), help="How many poses to fit to; all of the set by default.")
+@click.option("--poses", type=click.IntRange(min=1), help="Number of poses to fit to; all of the set by default.")
 @click.option(
     "--targets",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Shapes to fit to instead: .npz with vertices (frames, V, 3), and the poses as channels and angles.",
+    help="Target shapes to fit to: .npz with vertices (frames, V, 3), and the poses as channels and angles.",
 )
 @click.option(
     "--motion",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Motion file with the pose of every target, where the targets bring none.",
+    help="Motion file with the pose of every target, if the targets file has none.",
 )
 @click.option(
-    "--iterations", type=click.IntRange(min=1), default=14, show_default=True, help="Most steps of the minimiser."
+    "--iterations",
+    type=click.IntRange(min=1),
+    default=14,
+    show_default=True,
+    help="Largest number of optimisation steps.",
 )
 @options.json
 @options.quiet
@@ -75,13 +79,13 @@ def calibrate_command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Fit the covering's parameters to RIG over its joint ranges: volume kept without folds, roughness and stretch. No
-    pose gets worse than with the parameters it begins with.
+    """Fit the covering's parameters to RIG over its joint ranges, so that volume is preserved without folds, roughness
+    and stretch. No pose gets worse than with the parameters it starts from.
 
-    With --targets they are fitted to shapes that RIG shall have in given poses: scans, corrective shapes.
+    With --targets they are fitted to given shapes in given poses: scans, corrective shapes.
 
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd, .usda, .usdc, .usdz), a surface with --skeleton, or builtin:left,
-    builtin:right. Scripts load the file written with PARAMETERS."""
+    builtin:right. Scripts read the file with PARAMETERS."""
     from warpjld.cli.progress import progress
     from warpjld.cli.rig_argument import open_rig, rig_files
     from warpjld.covering.kept import bind_kept
@@ -95,9 +99,9 @@ def calibrate_command(
     if not out.absolute().parent.is_dir():
         raise InputError("cannot write the parameter file: no such folder", path=out.parent)
     if targets is not None and poses is not None:
-        raise InputError("--poses chooses of the set of poses: with --targets all of the file's are fitted to")
+        raise InputError("--poses limits the built-in set of poses; with --targets all poses of the file are used")
     if targets is None and motion is not None:
-        raise InputError("--motion gives the poses of --targets, which are not given")
+        raise InputError("--motion gives the poses of --targets, but there is no --targets")
     read = [path for path in (start, targets, motion) if path is not None]
     check_outputs([out], [*rig_files(rig, how), *read, *(file for path in read for file in files_of(path))])
     opened = open_rig(rig, **how)
@@ -105,14 +109,14 @@ def calibrate_command(
     with progress(quiet) as report:
         covering, _ = bind_kept(opened, parameters=begin, domains=domains)
         if targets is None:
-            summary, told, found = _calibrated(covering, poses, iterations, report)
+            summary, lines, found = _calibrated(covering, poses, iterations, report)
         else:
-            summary, told, found = _fitted(opened, covering, targets, motion, iterations, report)
+            summary, lines, found = _fitted(opened, covering, targets, motion, iterations, report)
     save_parameters(out, opened.skeleton, found)
     if as_json:
         answer({"rig": rig, "parameters": str(out), **summary})
     elif not quiet:
-        for line in told:
+        for line in lines:
             click.echo(line)
         click.echo(f"{out} written")
 
@@ -151,7 +155,7 @@ def _table(found: Calibration, before: dict[str, Any], after: dict[str, Any]) ->
         lines.append(f"{name:30}{format(before[key], form):>9}{format(after[key], form):>9}")
     if found.kept:
         joints = f"{len(found.kept)} joint{'s' * (len(found.kept) != 1)}"
-        lines.append(f"note: {joints} went back towards the start, or poses would have got worse")
+        lines.append(f"note: {joints} returned towards the start, since poses would have got worse")
     return [*lines, found.status.value]
 
 

@@ -1,4 +1,4 @@
-"""``warpjld deform``: a rig moved by motion files, its surface written as vertex caches."""
+"""``warpjld deform``: deform a rig by motion files and write vertex caches or motion files."""
 
 from __future__ import annotations
 
@@ -26,33 +26,33 @@ __all__ = ["deform_command"]
 @click.command("deform")
 @click.argument("rig")
 @click.argument("clips", nargs=-1, type=click.Path(path_type=Path), metavar="[MOTION]...")
-@click.option("--motion", "motions", multiple=True, type=click.Path(path_type=Path), help="A motion, likewise.")
+@click.option("--motion", "motions", multiple=True, type=click.Path(path_type=Path), help="A motion, as MOTION.")
 @click.option(
     "-o",
     "--out",
     type=click.Path(path_type=Path),
-    help=f"Cache to write ({', '.join(FORMATS)}); of a batch the folder to write into.",
+    help=f"Cache to write ({', '.join(FORMATS)}); for a batch the output folder.",
 )
 @click.option(
     "--motion-out",
     "motions_out",
     multiple=True,
     type=click.Path(path_type=Path),
-    help=f"Motion of RIG's own joints to write ({', '.join(MOTION_OUT)}); repeatable.",
+    help=f"Also write the motion of RIG's own joints ({', '.join(MOTION_OUT)}); repeatable.",
 )
 @click.option(
     "--format",
     "formats",
     multiple=True,
     type=click.Choice([suffix.lstrip(".") for suffix in FORMATS]),
-    help="Make a batch: every motion becomes a cache of this format in the folder --out; repeatable.",
+    help="Batch: write a cache of this format for every motion into the folder --out; repeatable.",
 )
 @click.option(
     "--motion-format",
     "motion_formats",
     multiple=True,
     type=click.Choice([suffix.lstrip(".") for suffix in MOTION_OUT]),
-    help="Likewise: the motion of RIG's own joints, as NAME.motion.bvh; repeatable.",
+    help="Batch: write the motion of RIG's own joints in this format, as NAME.motion.bvh; repeatable.",
 )
 @options.rig
 @click.option("--animation", help="Which animation of the motion file, by name, or all; the first by default.")
@@ -60,16 +60,16 @@ __all__ = ["deform_command"]
 @click.option(
     "--flat-hand-mean/--no-flat-hand-mean",
     default=None,
-    help="Whether no rotation in MANO poses is the flat hand, or MANO's mean pose, where the file does not say.",
+    help="Whether zero rotations in MANO poses mean the flat hand or MANO's mean pose, if the file does not say.",
 )
 @click.option("--frames", "span", metavar="A:B", help="Only frames A to B, both included, the motion's first being 0.")
-@click.option("--rate", type=float, help="Frames a second; the motion's own by default, 30 for CSV.")
+@click.option("--rate", type=float, help="Frames per second; by default the motion's own, 30 for CSV.")
 @click.option(
     "--limits",
     type=click.Choice(["error", "clamp", "ignore"]),
     default="error",
     show_default=True,
-    help="CSV angles beyond a joint's limit.",
+    help="What to do with CSV angles beyond a joint's limit.",
 )
 @options.parameters
 @click.option("--binding", type=click.Path(path_type=Path), help="Binding of RIG, as bind writes it.")
@@ -79,46 +79,45 @@ __all__ = ["deform_command"]
     type=click.Choice(["smooth", "paper"]),
     default="smooth",
     show_default=True,
-    help="Soft domain borders, or one segment a vertex as published.",
+    help="Smooth domain borders, or one segment per vertex as published.",
 )
 @click.option(
     "--touch",
     type=click.Choice(["off", "on", "limit"]),
     default="off",
     show_default=True,
-    help="Part skin that crosses (a display of contact); limit: close digits only until they touch.",
+    help="Push skin out of other skin (for display, without forces); limit: digits also stop where they touch.",
 )
-@click.option("--processes", type=click.IntRange(min=1), help="Worker processes of a batch; one a core by default.")
-@click.option("--fresh", is_flag=True, help="Make a batch again from its start, whatever the folder holds of it.")
+@click.option("--processes", type=click.IntRange(min=1), help="Worker processes of a batch; by default one per core.")
+@click.option("--fresh", is_flag=True, help="Start a batch again, ignoring what the folder already holds.")
 @options.device
 @options.threads
 @options.json
 @options.quiet
 def deform_command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...], **given: Any) -> None:
-    """Deform RIG by MOTION files and write the surface, frame after frame, in the vertex order of RIG's file, or the
-    motion of its joints.
+    """Deform RIG by MOTION files and write the animated surface in the vertex order of RIG's file, or the motion of
+    its joints.
 
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd), a surface with --skeleton, or builtin:left or builtin:right for
     the built-in hand. A MOTION is .bvh, .csv, a file with animations (.glb, .gltf, .vrma, .fbx, .usd) or a recording
-    of hands (.json, .npz, .npy). With --format or --motion-format (and
-    with more than one clip) it is a batch: RIG is bound once, clips are made in several processes, a clip that fails
-    does not end the others, and the same command goes on where it was stopped. manifest.json lists what was made of
-    what.
+    of hands (.json, .npz, .npy). With --format or --motion-format it is a batch of any number of clips: RIG is bound
+    once, clips are made in several processes, a clip that fails does not end the others, and the same command
+    continues where it was stopped. manifest.json lists inputs and outputs of every clip.
     """
     from warpjld.batch import clip_jobs
 
     jobs = clip_jobs([*motions, *clips], given["animation"])
     if not jobs:
-        raise InputError("deform: want a motion file behind RIG")
+        raise InputError("deform: want a motion file after RIG")
     how = {name: given.pop(name) for name in options.RIG}
     for name in ("formats", "motion_formats"):
         given[name] = tuple(f".{suffix}" for suffix in dict.fromkeys(given[name]))
     wanted = Wanted(rig, how, **given)
     batch = bool(wanted.formats or wanted.motion_formats)
     if len(jobs) > 1 and not batch:
-        raise InputError(f"{len(jobs)} clips: say by --format what each is to become, in the folder --out")
+        raise InputError(f"{len(jobs)} clips: want --format, the format to write for each into the folder --out")
     if batch and wanted.motions_out:
-        raise InputError("--motion-out names one file: a batch takes --motion-format")
+        raise InputError("--motion-out names one file: for a batch use --motion-format")
     if wanted.out is None and (batch or not wanted.motions_out):
         raise InputError(f"deform: want --out, the {'folder' if batch else 'file'} to write")
     check_outputs(wanted.outputs(jobs), wanted.inputs(jobs))
@@ -138,7 +137,7 @@ def _single(wanted: Wanted, job: ClipJob) -> None:
     from warpjld.motion.out import check_motion_out
 
     began = time.perf_counter()
-    if wanted.out is not None:  # an unknown suffix or a missing library must not cost the work of reading the rig
+    if wanted.out is not None:  # check suffix and libraries before the rig is read
         check_cache(wanted.out)
     for path in wanted.motions_out:
         check_motion_out(path)

@@ -1,4 +1,4 @@
-"""``warpjld deform`` of many clips: one bind, several processes, a manifest."""
+"""``warpjld deform`` for a batch of clips: bound once, several processes, a manifest."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def make_batch(wanted: Wanted, jobs: list[ClipJob]) -> None:
                 ended=lambda record: _tell_clip(record, wanted.quiet or wanted.as_json),
             )
         except KeyboardInterrupt:
-            click.echo(f"stopped; the same command goes on from what is in {wanted.out}", err=True)
+            click.echo(f"stopped; the same command continues from what is in {wanted.out}", err=True)
             raise
     frames = sum(clip.frames for clip in result.clips)
     if wanted.as_json:

@@ -1,4 +1,4 @@
-"""What ``warpjld deform`` was asked for: its options but for the motions, and what they name."""
+"""Options of ``warpjld deform`` other than the motions, and the rig, parameters and files that they name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Wanted", "checked_parameters", "count", "deforming", "opened_rig", "
 
 @dataclass(frozen=True)
 class Wanted:
-    """The command line, but for the motions."""
+    """Options of the command line other than the motions."""
 
     rig: str
     how: dict[str, Any]
@@ -46,7 +46,7 @@ class Wanted:
 
     @property
     def reading(self) -> dict[str, Any]:
-        """How motions are read."""
+        """Keyword arguments for reading motions."""
         return {
             "rate": self.rate,
             "limits": self.limits,
@@ -55,7 +55,7 @@ class Wanted:
         }
 
     def inputs(self, jobs: list[ClipJob]) -> list[Path]:
-        """Files that are read."""
+        """All files that are read."""
         from warpjld.cli.rig_argument import rig_files
         from warpjld.io.identity import files_of
 
@@ -67,7 +67,7 @@ class Wanted:
         ]
 
     def outputs(self, jobs: list[ClipJob]) -> list[Path]:
-        """Files that are written, but for those that lie beside a cache."""
+        """Files that are written, without companion files of a cache."""
         if not (self.formats or self.motion_formats):
             return [path for path in (self.out, *self.motions_out) if path is not None]
         assert self.out is not None
@@ -75,7 +75,7 @@ class Wanted:
         return [self.out / f"{job.name}{end}" for job in jobs for end in ends]
 
     def settings(self) -> dict[str, Any]:
-        """All that determines a batch's files besides the motions."""
+        """Everything besides the motions that determines the files of a batch."""
         from warpjld.files.manifest import versions
         from warpjld.io.identity import content_hash
 
@@ -100,7 +100,7 @@ class Wanted:
 
 
 def opened_rig(wanted: Wanted) -> Rig:
-    """The rig; what looks suspicious in it goes to stderr."""
+    """Open the rig; suspicious findings are printed on stderr."""
     from warpjld.cli.rig_argument import open_rig
     from warpjld.runtime.quiet import silence_warp
 
@@ -135,10 +135,10 @@ def deforming(wanted: Wanted) -> Deforming:
 
 
 def tell_rig(wanted: Wanted, rig: Rig) -> None:
-    """Say where to read what was mended."""
+    """Say how to see the notes on the rig, if there are any."""
     count = len(rig.notes)
     if count:
-        click.echo(f"note: {count} on what was recognised and mended in the rig: warpjld inspect {wanted.rig}")
+        click.echo(f"note: warpjld inspect {wanted.rig} shows {count} notes on what was recognised and repaired")
 
 
 def count(number: int, what: str) -> str:

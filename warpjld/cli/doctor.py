@@ -1,4 +1,4 @@
-"""``warpjld doctor``: what is installed, what it can do here, and what is missing."""
+"""``warpjld doctor``: report what is installed, what works here, and what is missing."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ __all__ = ["doctor_command"]
 
 _REQUIREMENT = re.compile(r"^(?P<name>[\w.-]+)\s*(?P<version>[^;]*?)\s*(?:;.*extra == ['\"](?P<extra>\w+)['\"].*)?$")
 _GATHERED = ("all", "dev", "docs")
-"""Extras that gather others, or are for people who change the program."""
+"""Extras that combine others, or are for developers."""
 
 
 @click.command("doctor")
 @click.option("--no-picture", is_flag=True, help="Do not try to draw.")
 @options.json
 def doctor_command(no_picture: bool, as_json: bool) -> None:
-    """Say what is installed and what works here: versions, devices, drawing, extras, caches; and what is missing.
+    """Report what is installed and works here: versions, devices, drawing, extras, caches; and what is missing.
 
-    The exit code is 1 where something does not work that every installation has.
+    The exit code is 1 if something that every installation needs does not work.
     """
     from warpjld.cli.answer import answer
     from warpjld.runtime.quiet import silence_warp
@@ -56,12 +56,12 @@ def doctor_command(no_picture: bool, as_json: bool) -> None:
 
 
 def _requirements() -> tuple[dict[str, str | None], dict[str, dict[str, str | None]]]:
-    """Installed versions of what is required, and by extra of what is optional; None where it is not installed."""
+    """Installed versions of required packages, and by extra of optional ones; None where not installed."""
     required: dict[str, str | None] = {}
     extras: dict[str, dict[str, str | None]] = {}
     for line in metadata.requires("warpjld") or ():
         match = _REQUIREMENT.match(line)
-        if match is None:  # an extra that names this package's own
+        if match is None:  # an extra that refers to other extras of this package
             continue
         name, extra = match["name"], match["extra"]
         if extra in _GATHERED:
@@ -75,14 +75,14 @@ def _requirements() -> tuple[dict[str, str | None], dict[str, dict[str, str | No
 
 
 def _devices() -> list[str]:
-    """What kernels run on."""
+    """Devices that kernels can run on."""
     import warp as wp
 
     return [f"{device.alias}: {device.name}" for device in wp.get_devices()]
 
 
 def _drawing() -> str:
-    """Whether a picture can be drawn off screen, and by what."""
+    """Test whether a picture can be rendered off screen; the result as text."""
     import numpy as np
 
     from warpjld.render import Camera, shaded
@@ -91,13 +91,13 @@ def _drawing() -> str:
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     try:
         picture = shaded(corners, faces, Camera.view("front", corners), size=(64, 48))
-    except Exception as error:  # whatever a driver does: it is told, not raised
+    except Exception as error:  # any failure of a driver is reported
         return f"failed: {type(error).__name__}: {error}"
     return "works off screen" if np.ptp(picture) else "failed: the picture is empty"
 
 
 def _caches() -> dict[str, dict[str, Any]]:
-    """Folders where things are kept from one run to the next, and how much is in them."""
+    """Cache folders and their sizes."""
     import warp as wp
 
     from warpjld.files.kept_files import kept_folder
@@ -114,12 +114,12 @@ def _size(folder: Path | None) -> dict[str, Any]:
     if folder is None:
         return {"folder": None, "bytes": 0, "writable": False}
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) if folder.is_dir() else 0
-    above = next((one for one in (folder, *folder.parents) if one.exists()), folder)
+    above = next((parent for parent in (folder, *folder.parents) if parent.exists()), folder)
     return {"folder": str(folder), "bytes": size, "writable": os.access(above, os.W_OK)}
 
 
 def _missing(found: dict[str, Any]) -> list[dict[str, Any]]:
-    """What does not work, and what would mend it."""
+    """What does not work, and how to fix it."""
     problems: list[dict[str, Any]] = [
         {"what": name, "needed": True, "do": f"pip install {name}"}
         for name, version in found["libraries"].items()
@@ -136,12 +136,12 @@ def _missing(found: dict[str, Any]) -> list[dict[str, Any]]:
     ]
     problems += [
         {
-            "what": f"{what} cannot be kept in {one['folder']}",
+            "what": f"{what} cannot be kept in {cache['folder']}",
             "needed": False,
-            "do": "name a folder that can be written",
+            "do": "set it to a writable folder",
         }
-        for what, one in found["caches"].items()
-        if one["folder"] is not None and not one["writable"]
+        for what, cache in found["caches"].items()
+        if cache["folder"] is not None and not cache["writable"]
     ]
     return problems
 
@@ -153,10 +153,10 @@ def _tell(found: dict[str, Any], missing: list[dict[str, Any]]) -> None:
     click.echo("devices:   " + "; ".join(found["devices"]))
     click.echo("drawing:   " + found["drawing"])
     for extra, packages in found["extras"].items():
-        told = ", ".join(f"{name} {version or 'is not installed'}" for name, version in packages.items())
-        click.echo(f"extra {extra:8} {told}")
-    for what, one in found["caches"].items():
-        where = "off" if one["folder"] is None else f"{one['folder']}, {one['bytes'] / 1e6:.0f} MB"
+        listed = ", ".join(f"{name} {version or 'is not installed'}" for name, version in packages.items())
+        click.echo(f"extra {extra:8} {listed}")
+    for what, cache in found["caches"].items():
+        where = "off" if cache["folder"] is None else f"{cache['folder']}, {cache['bytes'] / 1e6:.0f} MB"
         click.echo(f"kept {what}: {where}")
     for problem in missing:
         click.echo(f"{'missing' if problem['needed'] else 'optional'}: {problem['what']}: {problem['do']}")

@@ -1,4 +1,4 @@
-"""``warpjld example``: the examples that come with the package, listed, run or copied."""
+"""``warpjld example``: list, run or copy the examples that come with the package."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ __all__ = ["example_command", "example_files", "examples_folder"]
 
 _SUFFIXES = (".jld", ".toml", ".py")
 _WITH = {"user_command.jld": ("user_command.py",), "grasp_objects.py": ("grasp_objects.toml",)}
-"""Files that an example needs beside itself."""
+"""Further files that an example needs."""
 _NO_EXAMPLE = ("user_command.py", "grasp_objects.toml", "grasp_real_objects.toml")
-"""Files that belong to another example, or want assets that do not come with the package."""
+"""Files that are part of another example, or need assets that do not come with the package."""
 
 
 def examples_folder() -> Path:
-    """Where the examples are: in the installed package, or beside it in a checkout.
+    """Folder of the examples: in the installed package, or next to it in a checkout.
 
     Raises:
-        WarpjldError: Nowhere.
+        WarpjldError: There is none.
     """
     package = Path(__file__).resolve().parents[1]
     for folder in (package / "examples", package.parent / "examples"):
@@ -37,7 +37,7 @@ def examples_folder() -> Path:
 
 
 def example_files() -> dict[str, Path]:
-    """The examples by the name they are called by: the file's stem, or its name where two share a stem."""
+    """Files of the examples by name, which is the file's stem."""
     files = [
         file
         for file in sorted(examples_folder().iterdir())
@@ -86,7 +86,7 @@ def example_command(
 
 
 def _first_line(file: Path) -> str:
-    """What a file says of itself in its first line."""
+    """First line of a file, which describes it."""
     line = file.read_text(encoding="utf-8").partition("\n")[0]
     return line.strip('#" ').replace("``", "")
 
@@ -94,11 +94,11 @@ def _first_line(file: Path) -> str:
 def _list(files: dict[str, Path], as_json: bool) -> None:
     from warpjld.cli.answer import answer
 
-    told = {name: _first_line(file) for name, file in files.items()}
+    described = {name: _first_line(file) for name, file in files.items()}
     if as_json:
-        answer({name: {"file": str(files[name]), "shows": text} for name, text in told.items()})
+        answer({name: {"file": str(files[name]), "shows": text} for name, text in described.items()})
         return
-    for name, text in told.items():
+    for name, text in described.items():
         click.echo(f"{name:24} {text}")
     click.echo("\nwarpjld example NAME -o out runs one, --copy copies its files; they are in " + str(examples_folder()))
 
@@ -110,25 +110,25 @@ def _copy(file: Path, out: Path, quiet: bool) -> None:
     for name in (file.name, *_WITH.get(file.name, ())):
         target = out / name
         if target.exists():
-            raise InputError("is there already", path=target)
+            raise InputError("exists already", path=target)
         shutil.copyfile(file.with_name(name), target)
         if not quiet:
             click.echo(target)
 
 
 def _run_program(file: Path, arguments: tuple[str, ...], out: Path) -> None:
-    """A program of its own process, in the output folder; arguments that name files are found from there."""
+    """Run a Python example in a process, in the output folder; arguments that name files become absolute paths."""
     from warpjld.files.folders import make_folder
 
     make_folder(out)
-    given = [os.path.abspath(one) if os.path.exists(one) else one for one in arguments]
+    given = [os.path.abspath(argument) if os.path.exists(argument) else argument for argument in arguments]
     done = subprocess.run([sys.executable, str(file), *given], cwd=out, check=False)
     if done.returncode:
         raise WarpjldError(f"{file.name} ended with exit code {done.returncode}")
 
 
 def _run_file(ctx: click.Context, file: Path, out: Path, as_json: bool, quiet: bool) -> None:
-    """A script or study, by the command that runs such files."""
+    """Run a script or study with the command for such files."""
     from warpjld.cli import fem, run, study
 
     shared = {"out": out, "as_json": as_json, "quiet": quiet}
@@ -142,7 +142,7 @@ def _run_file(ctx: click.Context, file: Path, out: Path, as_json: bool, quiet: b
 
 
 def _table_format() -> str:
-    """Parquet where it can be written: an example shall not want an extra."""
+    """Parquet if it is installed, else CSV, since examples should not need an extra."""
     from warpjld.errors import MissingExtraError
     from warpjld.tables.files import require_parquet
 

@@ -1,4 +1,4 @@
-"""``warpjld fem``: a finite-element study from a TOML file."""
+"""``warpjld fem``: run a finite-element study from a TOML file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["fem_command"]
 
-_ROUNDING = 1e-9  # of the largest reaction: smaller ones are shown as none
+_ROUNDING = 1e-9  # reactions smaller than this fraction of the largest are shown as 0
 
 
 @click.command("fem")
@@ -32,9 +32,9 @@ _ROUNDING = 1e-9  # of the largest reaction: smaller ones are shown as none
 def fem_command(study: Path, out: Path | None, no_pictures: bool, as_json: bool, quiet: bool) -> None:
     """Solve the load steps of STUDY (a .toml file, see docs/reference/fem-study.md and examples/inflate_ball.toml).
 
-    Written: NAME.pvd with one .vtu an instant (for ParaView), reactions.csv, and pictures of displacement and stress
-    after each step; they take the place of former ones when all are made. When a step finds no equilibrium, or at
-    Ctrl-C, what was reached is written and the exit code is 1, or 130.
+    Output: NAME.pvd with one .vtu per instant (for ParaView), reactions.csv, and pictures of displacement and stress
+    after each step; earlier files are replaced when all are made. If a step finds no equilibrium, or at Ctrl-C, the
+    results so far are written and the exit code is 1, or 130.
     """
     from rich.console import Console
 
@@ -81,7 +81,7 @@ def fem_command(study: Path, out: Path | None, no_pictures: bool, as_json: bool,
         console.print(f"{seconds:.1f} s; results in {folder}")
     if stopped:
         instants = f"step {results.last.step.name}, load {results.last.instant.factor:.3f}"
-        click.echo(f"stopped; what was reached ({instants}) is in {folder}", err=True)
+        click.echo(f"stopped; the results so far ({instants}) are in {folder}", err=True)
         raise KeyboardInterrupt
     if not results.last.solution.converged:
         raise WarpjldError(f"{results.last.step.name}: {results.last.solution.message}")

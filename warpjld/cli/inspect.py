@@ -1,4 +1,4 @@
-"""``warpjld inspect``: what was recognised in a rig, how it is placed, and a picture of it."""
+"""``warpjld inspect``: report what was recognised in a rig, with a picture of its skeleton."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["inspect_command"]
 @click.option("--write-skeleton", type=click.Path(path_type=Path), help="Skeleton file to write, for editing.")
 @click.option("--write-map", type=click.Path(path_type=Path), help="Joint map to write, for editing (see --map).")
 @options.json
-@click.option("-q", "--quiet", is_flag=True, help="Say only what looks suspicious.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only what looks suspicious.")
 def inspect_command(
     rig: str,
     out: Path | None,
@@ -40,7 +40,7 @@ def inspect_command(
     """Report what was recognised in RIG: joints, domains, limits, animations, and joints that look misplaced.
 
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd, .usda, .usdc, .usdz), a surface with --skeleton, or builtin:left,
-    builtin:right. A picture of the surface's wire-frame with the named skeleton in it is written beside, unless
+    builtin:right. A picture of the surface's wire-frame with the named skeleton is written as well, unless
     --no-picture.
     """
     from warpjld.cli.rig_argument import open_rig, rig_files
@@ -137,7 +137,7 @@ def _report(rig: Rig) -> dict[str, Any]:
 
 
 def _points(rig: Rig) -> dict[str, Any]:
-    """The 87 points of a body, or 25 of each hand, that a rig holds (R12)."""
+    """The rig's 87 named points of a body, or 25 of each hand (R12)."""
     from warpjld.skeleton.actor import actor_skeleton, hand_points
 
     if "pelvis" in rig.skeleton.names:
@@ -151,7 +151,7 @@ def _points(rig: Rig) -> dict[str, Any]:
 
 
 def _domains(rig: Rig) -> NDArray[np.int64]:
-    """Vertices in the domain of each segment, counted at the joint the segment ends at, shape (J,) (R16)."""
+    """Number of vertices in the domain of the segment that ends at each joint, shape (J,) (R16)."""
     from warpjld.covering import bind_rig
 
     anchors = bind_rig(rig).anchors

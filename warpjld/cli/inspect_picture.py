@@ -1,4 +1,4 @@
-"""The picture ``warpjld inspect`` writes: wire-frame, skeleton, and the names of its joints."""
+"""Picture of ``warpjld inspect``: wire-frame, skeleton, and names of its joints."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
     """Write a PNG of the rest pose: a hand from its back and from the thumb's side, a body from the front and side.
 
     Args:
-        rig: What to draw.
-        path: PNG file.
-        suspicious: Joints to mark.
+        rig: The rig.
+        path: PNG file to write.
+        suspicious: Names of joints to mark.
 
     Raises:
-        InputError: It cannot be written there.
+        InputError: It cannot be written.
     """
     import pyvista
 
@@ -74,7 +74,7 @@ def draw_rig(rig: Rig, path: Path, *, suspicious: Set[str] = frozenset()) -> Non
 
 
 def _views(rig: Rig) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Directions to look from, each with its up."""
+    """Viewing directions, each with its up direction."""
     from warpjld.skeleton.recognise.hand_frame import hand_frame
 
     skeleton = rig.skeleton
@@ -88,7 +88,7 @@ def _views(rig: Rig) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
 
 
 def _named(rig: Rig) -> list[int]:
-    """Joints to label: all of a hand; of a body all but its fingers and toes, which would cover one another."""
+    """Joints to label: all of a hand; for a body not those of fingers and toes, whose labels would overlap."""
     names = rig.skeleton.names
     if "pelvis" not in names:
         return list(range(len(names)))

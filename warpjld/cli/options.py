@@ -1,4 +1,4 @@
-"""Options that several commands have."""
+"""Options shared by several commands."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ out_folder: Decorator = click.option(
 )
 device: Decorator = click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
 threads: Decorator = click.option(
-    "--threads", type=click.IntRange(min=1), help="CPU threads; as many as pay by default."
+    "--threads", type=click.IntRange(min=1), help="CPU threads; chosen automatically by default."
 )
 commands: Decorator = click.option(
     "--commands", multiple=True, type=click.Path(path_type=Path), help="Python file that adds commands; repeatable."
@@ -43,10 +43,10 @@ domains: Decorator = click.option(
     type=click.Choice(["geometry", "skin"]),
     default="geometry",
     show_default=True,
-    help="Where a vertex's domain comes from: the surface alone, or painted weights.",
+    help="Source of the vertices' domains: the surface's geometry, or painted weights.",
 )
 parameters: Decorator = click.option(
-    "--parameters", type=click.Path(path_type=Path), help="Covering parameters, as calibrate writes them."
+    "--parameters", type=click.Path(path_type=Path), help="Covering parameters, a file written by calibrate."
 )
 ray: Decorator = click.option(
     "--ray",
@@ -54,10 +54,10 @@ ray: Decorator = click.option(
     help="Run on a Ray cluster: its address, auto, or local for workers on this machine (extra ray).",
 )
 allow_mixed: Decorator = click.option(
-    "--allow-mixed", is_flag=True, help="With --ray: take machines too that give other last bits."
+    "--allow-mixed", is_flag=True, help="With --ray: also use machines whose results differ in the last bits."
 )
 trial_processes: Decorator = click.option(
-    "--processes", type=click.IntRange(min=1), help="Worker processes; one a core by default."
+    "--processes", type=click.IntRange(min=1), help="Worker processes; by default one per core."
 )
 table_format: Decorator = click.option(
     "--table",
@@ -67,10 +67,10 @@ table_format: Decorator = click.option(
     help="Format of the results table.",
 )
 fresh_start: Decorator = click.option(
-    "--fresh", is_flag=True, help="Start again, forgetting the trials in the output folder."
+    "--fresh", is_flag=True, help="Start again, deleting the trials in the output folder."
 )
 json: Decorator = click.option("--json", "as_json", is_flag=True, help="Write the result to stdout as JSON.")
-quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+quiet: Decorator = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors and warnings.")
 
 
 RIG = ("skeleton", "points", "side", "unit", "scale", "up", "joint_map", "centre_joints")
@@ -78,15 +78,15 @@ RIG = ("skeleton", "points", "side", "unit", "scale", "up", "joint_map", "centre
 
 
 LISTED = Path("-")
-"""What ``--points`` without a file gives where a command lists points."""
+"""Value of ``--points`` without a file, for commands that list points."""
 
 
 def rig(command: Callable[..., Any], *, lists_points: bool = False) -> Callable[..., Any]:
-    """How to read a RIG that does not say everything itself: the keyword arguments of ``open_rig``.
+    """Decorator that adds the options for reading a RIG; they are passed as keyword arguments of ``open_rig``.
 
     Args:
         command: The function to decorate.
-        lists_points: Whether ``--points`` may stand without a file, which then is ``LISTED``.
+        lists_points: Whether ``--points`` may be given without a file; its value is then ``LISTED``.
     """
     points: dict[str, Any] = {"is_flag": False, "flag_value": LISTED} if lists_points else {}
     alone = "; alone: list the points that RIG holds" if lists_points else ""
@@ -95,19 +95,21 @@ def rig(command: Callable[..., Any], *, lists_points: bool = False) -> Callable[
             "--centre-joints",
             is_flag=True,
             default=None,
-            help="Move RIG's joints that lie off the middle of a finger's or limb's flesh there (see inspect).",
+            help="Move RIG's joints that are off the centre of a finger's or limb's flesh to the centre (see inspect).",
         ),
         click.option("--up", type=click.Choice(["y", "z"]), help="RIG's up axis; guessed by default."),
-        click.option("--scale", type=float, help="Factor for all of RIG's lengths; without --unit none is guessed."),
+        click.option(
+            "--scale", type=float, help="Factor for all of RIG's lengths; without --unit the unit is not guessed."
+        ),
         click.option("--unit", type=click.Choice(["m", "cm", "mm", "in"]), help="RIG's unit; guessed by default."),
         click.option(
-            "--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file leaves it open."
+            "--side", type=click.Choice(["left", "right"]), help="Which hand RIG is, if the file does not determine it."
         ),
         click.option(
             "--map",
             "joint_map",
             type=click.Path(path_type=Path),
-            help="JSON that states joints by hand: canonical name to RIG's own.",
+            help="Joint map (JSON): RIG's own joint by canonical name.",
         ),
         click.option(
             "--points",

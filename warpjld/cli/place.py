@@ -1,4 +1,4 @@
-"""``warpjld place``: named points proposed in a digitised surface, for correction by hand (R12)."""
+"""``warpjld place``: propose named points for a digitised surface, to be corrected by hand (R12)."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ __all__ = ["place_command"]
 def place_command(surface: Path, out: Path, side: str | None, picture: Path | None, as_json: bool, quiet: bool) -> None:
     """Propose the 87 named points of a digitised body, or the 25 of a hand, from SURFACE alone.
 
-    A body stands upright along an axis, its legs, arms and fingers apart. The file is in SURFACE's own unit and axes;
-    correct it by hand, look at it with `inspect SURFACE --points FILE`, use it with MODEL … POINTS.
+    A body must stand upright along an axis, with legs, arms and fingers apart. The file is in SURFACE's own unit and
+    axes. Look at it with `inspect SURFACE --points FILE`, correct it by hand, use it in scripts with MODEL … POINTS.
     """
     from warpjld.files.overwriting import check_outputs
     from warpjld.io.mesh_file import read_mesh

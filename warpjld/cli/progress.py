@@ -1,4 +1,4 @@
-"""A progress bar on stderr, for people only: nothing is written where stderr is not a terminal."""
+"""Progress bar on stderr; nothing is written if stderr is not a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["progress"]
 
 @contextmanager
 def progress(quiet: bool = False) -> Iterator[Report]:
-    """A bar, gone when the work is done."""
+    """Context with a progress bar that disappears at the end; yields the progress callback."""
     if quiet or not sys.stderr.isatty():
         yield lambda what, done, total: None
         return

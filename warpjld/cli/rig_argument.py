@@ -20,14 +20,14 @@ _OPTIONS = {
 
 
 def open_rig(text: str, **how: Any) -> Rig:
-    """The rig a user named: a path, ``builtin:left``, ``:right`` or ``:body``; what looks suspicious goes to stderr.
+    """Open the RIG argument: a path, ``builtin:left``, ``:right`` or ``:body``; suspicious findings go to stderr.
 
     Args:
-        text: What stands on the command line.
-        how: Keyword arguments of ``load_rig``, as ``options.rig`` collects them; None for what was not given.
+        text: The argument.
+        how: Keyword arguments of ``load_rig`` from ``options.rig``; None for options that were not given.
 
     Raises:
-        InputError: No such side, a file that is no rig, or options that only files take.
+        InputError: No such built-in rig, a file that is no rig, or options that only apply to files.
     """
     kind, colon, which = text.partition(":")
     if kind != "builtin" or not colon:
@@ -37,7 +37,7 @@ def open_rig(text: str, **how: Any) -> Rig:
         warn(rig.suspicious, "suspicious")
         return rig
     if which not in ("left", "right", "body"):
-        raise InputError(f"nothing built in is called '{which}': want builtin:left, builtin:right or builtin:body")
+        raise InputError(f"there is no built-in rig '{which}': want builtin:left, builtin:right or builtin:body")
     given = [f"--{_OPTIONS.get(name, name)}" for name, value in how.items() if value is not None]
     if given:
         raise InputError(f"{text}: {', '.join(given)} only work for files")

@@ -1,4 +1,4 @@
-"""``warpjld run``: a script from a file, and everything it asks for made."""
+"""``warpjld run``: run a script and write its outputs."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ __all__ = ["run_command"]
 @options.device
 @options.threads
 @options.commands
-@click.option("--check", is_flag=True, help="Read the script and say what it would make; compute nothing.")
-@click.option("--html", is_flag=True, help="Make a page (HTML) too, in which the animation is turned with the mouse.")
+@click.option("--check", is_flag=True, help="Check the script and list its outputs; compute nothing.")
+@click.option("--html", is_flag=True, help="Also write the animation as an interactive HTML page.")
 @options.json
 @options.quiet
 def run_command(
@@ -33,8 +33,8 @@ def run_command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Run SCRIPT and make the pictures, films and exports it asks for; if it asks for none, an animated surface (NPZ),
-    a film and a contact sheet. A summary goes to summary.json in the output folder."""
+    """Run SCRIPT and write the pictures, films and exports that it specifies; if it specifies none, an animated surface
+    (NPZ), a film and a contact sheet. A summary is written to summary.json in the output folder."""
     from warpjld.cli.progress import progress
     from warpjld.runtime.quiet import silence_warp
     from warpjld.script.run_script import run_script

@@ -1,4 +1,4 @@
-"""``warpjld score``: grasps of others, judged by the columns of a grasp study."""
+"""``warpjld score``: measure grasps of other programs with the metrics of a grasp study."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ __all__ = ["score_command"]
 @click.command("score")
 @click.argument("grasps", type=click.Path(path_type=Path))
 @options.out_folder
-@click.option("--hand", metavar="RIG", help="Whose grasps they are: a rig file, builtin:left or builtin:right.")
+@click.option("--hand", metavar="RIG", help="The hand: a rig file, builtin:left or builtin:right.")
 @click.option("--objects", type=click.Path(path_type=Path), help="Folder of surfaces, in the frame of the grasps.")
-@click.option("--object-unit", "unit", default="m", show_default=True, help="Unit of these: m, dm, cm, mm, in.")
+@click.option("--object-unit", "unit", default="m", show_default=True, help="Their unit: m, dm, cm, mm, in.")
 @click.option(
     "--plan",
     type=click.Path(path_type=Path),
-    help="A study file that has hands, objects and [measuring], instead of --hand and --objects.",
+    help="Study file with hands, objects and [measuring], instead of --hand and --objects.",
 )
 @click.option(
-    "--map", "joint_map", type=click.Path(path_type=Path), help="JSON: which angle of the hand each joint is."
+    "--map", "joint_map", type=click.Path(path_type=Path), help="Joint map (JSON): the hand's angle for each joint."
 )
-@click.option("--friction", type=float, default=0.6, show_default=True, help="Where a grasp brings none.")
+@click.option("--friction", type=float, default=0.6, show_default=True, help="Coefficient for grasps without one.")
 @click.option(
     "--flat-hand-mean/--no-flat-hand-mean",
     default=None,
-    help="Whether no rotation of a MANO pose is the flat hand; where the file does not say.",
+    help="Whether zero rotations of a MANO pose mean the flat hand, if the file does not say.",
 )
 @click.option(
     "--frames",
     type=click.Choice(["last", "all"]),
     default="last",
     show_default=True,
-    help="Of a recording, its last frame is the grasp, or each.",
+    help="Whether a recording's last frame is the grasp, or every frame.",
 )
 @options.trial_processes
 @options.table_format
@@ -62,10 +62,10 @@ def score_command(
     quiet: bool,
     **how: Any,
 ) -> None:
-    """Judge GRASPS, a file or folder, on skin that deforms: the table of a grasp study, a row for each.
+    """Measure GRASPS, a file or folder, on deformed skin, and write the table of a grasp study with a row for each.
 
-    Read are a study's folder, isaac_grasp YAML 1.0, DexGraspBench and GraspXL .npy (pickles are never executed), CSV of
-    joint angles in degrees, and surfaces as study --export mesh writes them."""
+    Formats: a study's folder, isaac_grasp YAML 1.0, DexGraspBench and GraspXL .npy (pickles are never executed), CSV of
+    joint angles in degrees, and surfaces as written by study --export mesh."""
     from warpjld.cli.progress import progress
     from warpjld.runtime.quiet import silence_warp
     from warpjld.study.run import run_study
@@ -82,7 +82,7 @@ def score_command(
             where: dict[str, Any] = {"processes": processes, "ray": ray, "allow_mixed": allow_mixed}
             result = run_study(experiment, out, **where, table=table, fresh=fresh, title=grasps.name, report=report)
         except KeyboardInterrupt:
-            click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
+            click.echo(f"stopped; the same command continues from what is in {out}", err=True)
             raise
     warn(result.notes)
     tell(result, notes, as_json, quiet, what="grasps")

@@ -1,4 +1,4 @@
-"""``warpjld shell``: commands typed one by one, with what they did to look at (R4, R5, R88)."""
+"""``warpjld shell``: interactive session in the command language (R4, R5, R88)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ __all__ = ["shell_command"]
 
 _PROMPT, _MORE = "jld> ", "...> "
 _HISTORY = Path("~/.warpjld_history")
-_WELCOME = "HELP lists the commands, RUN makes the files, SAVE keeps what was typed, QUIT leaves."
+_WELCOME = 'HELP lists the commands, RUN makes the files, SAVE "name.jld" saves the lines, QUIT leaves.'
 _ENDS = ("SIGTERM", "SIGHUP")
-"""Signals by which others end a session."""
+"""Signals that end a session."""
 
 
 class _EndedError(BaseException):
-    """Another program, or the system, ends the session."""
+    """Raised by the handler of these signals."""
 
 
 @click.command("shell")
@@ -38,7 +38,7 @@ class _EndedError(BaseException):
 @options.threads
 @options.commands
 def shell_command(script: Path | None, out: Path, device: str, threads: int | None, commands: tuple[Path, ...]) -> None:
-    """Type commands of the language, after running SCRIPT if one is given. Commands may also be piped in; then the
+    """Run the commands of scripts interactively, after SCRIPT if one is given. Commands may also be piped in; then the
     first error ends the shell."""
     from warpjld.runtime.quiet import silence_warp
     from warpjld.script.plugin import load_commands
@@ -55,7 +55,7 @@ def shell_command(script: Path | None, out: Path, device: str, threads: int | No
 
 
 def _read_through(session: Session, script: Path | None) -> None:
-    """Commands from a pipe: the first error ends them, and says where the lines before it are."""
+    """Run commands from a pipe; the first error ends the session."""
     if script is not None:
         session.run_file(script)
     if isinstance(sys.stdin, io.TextIOWrapper):
@@ -67,14 +67,13 @@ def _read_through(session: Session, script: Path | None) -> None:
         except WarpjldError:
             raise
         except Exception as error:
-            told = f"unexpected {type(error).__name__}: {error}"
-            raise WarpjldError(f"{told}{_kept(session)}") from error
+            message = f"unexpected {type(error).__name__}: {error}"
+            raise WarpjldError(f"{message}{_kept(session)}") from error
     session.end()
 
 
 def _converse(session: Session, script: Path | None) -> None:
-    """A session at a terminal, which nothing ends but QUIT: errors are told, and all lines before them kept, also in a
-    file, which goes when they are saved."""
+    """Run a session at a terminal until QUIT: errors are printed and do not end it; unsaved lines are autosaved."""
     for name in _ENDS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _end)
@@ -94,7 +93,7 @@ def _converse(session: Session, script: Path | None) -> None:
 
 
 def _guarded(session: Session, act: Callable[[], object]) -> bool:
-    """Do what a line says; whatever comes of it, the session goes on, unless the line says QUIT."""
+    """Run ``act``, print any error, and autosave; False only if the line was QUIT."""
     try:
         try:
             goes_on = act() is not False
@@ -103,17 +102,17 @@ def _guarded(session: Session, act: Callable[[], object]) -> bool:
         except WarpjldError as error:
             click.echo(f"error: {one_line(str(error))}", err=True)
         except KeyboardInterrupt:
-            click.echo("stopped; what was typed before is as it was", err=True)
-        except (Exception, SystemExit) as error:  # a fault, or a user's command that calls exit()
-            told = one_line(f"unexpected {type(error).__name__}: {error}")
-            click.echo(f"error: {told}{_kept(session)}", err=True)
-    except KeyboardInterrupt:  # while something was told
+            click.echo("stopped; the effects of this line are undone", err=True)
+        except (Exception, SystemExit) as error:  # a bug, or a user's command that calls exit()
+            message = one_line(f"unexpected {type(error).__name__}: {error}")
+            click.echo(f"error: {message}{_kept(session)}", err=True)
+    except KeyboardInterrupt:  # while a message was printed
         pass
     return True
 
 
 def _kept(session: Session) -> str:
-    """Where lines that are not saved are kept, to be put behind what is told; empty where there are none."""
+    """Autosave; text about the file, to append to a message, empty if there are no unsaved lines."""
     kept = session.autosave()
     return "" if kept is None else f"; the lines typed so far are in {kept}"
 
@@ -123,8 +122,7 @@ def _end(number: int, frame: object) -> NoReturn:
 
 
 def _lines(names: Callable[[], list[str]], prompt: Callable[[], str], kept: Callable[[], str]) -> Iterator[str]:
-    """Lines from the terminal with history and completion, where that can be had. Its end is that of a session only
-    when it is told twice: Ctrl-D is easily hit."""
+    """Lines from the terminal, with history and completion if available. Ctrl-D ends the input only the second time."""
     read = _reader(names)
     ended = False
     while True:
@@ -133,7 +131,7 @@ def _lines(names: Callable[[], list[str]], prompt: Callable[[], str], kept: Call
         except KeyboardInterrupt:
             continue
         except UnicodeDecodeError:
-            click.echo("error: the line was not read: it is no text", err=True)
+            click.echo("error: the line could not be read: it is not valid text", err=True)
             continue
         except (EOFError, OSError):  # OSError: the terminal is gone
             if ended:
@@ -144,8 +142,8 @@ def _lines(names: Callable[[], list[str]], prompt: Callable[[], str], kept: Call
         except Exception as error:  # a history that cannot be read, …
             if read is input:
                 return
-            told = one_line(f"{type(error).__name__}: {error}")
-            click.echo(f"error: the line was not read ({told}); history and completion are off", err=True)
+            reason = one_line(f"{type(error).__name__}: {error}")
+            click.echo(f"error: the line could not be read ({reason}); history and completion are off", err=True)
             read = input
             continue
         ended = False
@@ -165,7 +163,7 @@ def _reader(names: Callable[[], list[str]]) -> Callable[[str], str]:
     except ImportError:
         click.echo("for history and completion: pip install 'warpjld[shell]'", err=True)
         return input
-    except Exception as error:  # no home folder, a terminal that it does not know
+    except Exception as error:  # no home folder, an unknown terminal
         click.echo(f"no history and completion: {one_line(str(error))}", err=True)
         return input
     return session.prompt

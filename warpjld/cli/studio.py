@@ -1,4 +1,4 @@
-"""``warpjld studio``: a script made with mouse and keyboard in the browser (R88)."""
+"""``warpjld studio``: edit a script in the browser with a 3D view (R88)."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["studio_command"]
 @options.out_folder
 @options.device
 @options.commands
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; any other wants a token.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; any other needs a token.")
 @click.option("--port", default=8080, show_default=True, type=click.IntRange(0, 65535), help="Port, or the next free.")
 @click.option("--browser/--no-browser", default=True, help="Open the page in the browser.")
 def studio_command(
     script: Path | None, out: Path, device: str, commands: tuple[Path, ...], host: str, port: int, browser: bool
 ) -> None:
-    """Open SCRIPT, or a rig, in a studio that is seen in the browser: pose, key, grasp, press. Files are read from the
-    script's folder only. Ctrl-C ends it; what is not saved is kept beside the script and found again."""
+    """Open SCRIPT, or a rig, in the studio in the browser: pose, set keys, grasp, press. Files are read from the
+    script's folder only. Ctrl-C ends it; unsaved edits are kept in a file next to the script and restored next time."""
     from warpjld.runtime.quiet import silence_warp
     from warpjld.script.plugin import load_commands
     from warpjld.studio.opening import opened_document

@@ -1,4 +1,4 @@
-"""``warpjld study``: many grasps, planned in a TOML file, brought into one table."""
+"""``warpjld study``: run a grasp study planned in a TOML file."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ __all__ = ["study_command"]
 @options.trial_processes
 @options.table_format
 @options.fresh_start
-@click.option("--rerun", "row", type=click.IntRange(min=0), metavar="ROW", help="Repeat one trial, with pictures.")
+@click.option(
+    "--rerun", "row", type=click.IntRange(min=0), metavar="ROW", help="Repeat one trial, compare it, and draw it."
+)
 @click.option(
     "--export",
     "exports",
     multiple=True,
     type=click.Choice(["isaac", "dexgraspbench", "mesh"]),
-    help="Also write the closed hands for other programs, into OUT/export; repeatable.",
+    help="Also write the closed hands in this format into OUT/export; repeatable.",
 )
-@click.option("--only", metavar="ROWS", help="Trials that --export writes, such as 0-9,17; all that closed by default.")
-@click.option("--check", is_flag=True, help="Read the plan and load its hands and objects; run nothing.")
+@click.option("--only", metavar="ROWS", help="Trials that --export writes, such as 0-9,17; by default all that closed.")
+@click.option("--check", is_flag=True, help="Check the plan and load its hands and objects; run nothing.")
 @options.device
 @options.ray
 @options.allow_mixed
@@ -51,10 +53,10 @@ def study_command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Run the grasp study PLAN (TOML), or go on where it was stopped.
+    """Run the grasp study PLAN (TOML), or continue where it was stopped.
 
-    Leaves a table, the poses, a manifest and a summary in the output folder. The table is the same, byte for byte,
-    whatever the number of processes and however often the study was stopped."""
+    A table, the poses, a manifest and a summary are written to the output folder. The table is the same, byte for byte,
+    for any number of processes and however often the study was stopped."""
     from warpjld.cli.progress import progress
     from warpjld.errors import InputError
     from warpjld.runtime.quiet import silence_warp
@@ -64,10 +66,10 @@ def study_command(
     study = Study.load(plan, device=device)
     trials = rows_of(only)
     if trials is not None and not exports:
-        raise InputError("--only says which trials --export writes: give that too")
+        raise InputError("--only chooses the trials that --export writes, but there is no --export")
     if row is not None:
         if fresh or check or exports:
-            raise InputError("--rerun repeats a trial that is there: --fresh, --check and --export do not go with it")
+            raise InputError("--rerun cannot be combined with --fresh, --check or --export")
         with progress(quiet) as report:
             again = study.rerun(out, row, report=report)
         tell_rerun(again, as_json, quiet)
@@ -84,17 +86,17 @@ def study_command(
             result = study.run(out, processes=processes, table=table, fresh=fresh, **where, report=report)
             exported = study.export(out, exports, trials=trials) if exports else []
         except KeyboardInterrupt:
-            click.echo(f"stopped; the same command goes on from what is in {out}", err=True)
+            click.echo(f"stopped; the same command continues from what is in {out}", err=True)
             raise
     warn(result.notes)
     tell(result, notes, as_json, quiet, exported=exported)
 
 
 def rows_of(text: str | None) -> list[int] | None:
-    """Numbers of a list such as ``0-9,17``.
+    """Numbers in a list such as ``0-9,17``.
 
     Raises:
-        InputError: It is no such list.
+        InputError: Not such a list.
     """
     from warpjld.errors import InputError
 
@@ -102,7 +104,7 @@ def rows_of(text: str | None) -> list[int] | None:
         return None
     rows: list[int] = []
     for part in text.split(","):
-        first, dash, last = (one.strip() for one in part.partition("-"))
+        first, dash, last = (piece.strip() for piece in part.partition("-"))
         if not first.isdecimal() or (dash and not last.isdecimal()) or len(first + last) > 14:
             raise InputError(f"--only: want numbers of trials such as 0-9,17, got '{part.strip()[:40]}'")
         rows += range(int(first), int(last or first) + 1)

@@ -1,4 +1,4 @@
-"""What ``study`` and ``score`` say when they are done."""
+"""Output of ``warpjld study`` and ``warpjld score``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["tell", "tell_checked", "tell_rerun"]
 
 
 def tell_checked(path: Path, plan: GraspPlan, notes: list[str], as_json: bool, quiet: bool) -> None:
-    """What a plan holds."""
+    """Print the size of a plan."""
     combinations = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
     tried = min(combinations, plan.trials)
     if as_json:
@@ -40,7 +40,7 @@ def tell(
     exported: Sequence[Path] = (),
     what: str = "trials",
 ) -> None:
-    """The result of a study; ``what`` its trials are called."""
+    """Print the result of a study; ``what`` is the word for its trials."""
     from dataclasses import asdict
 
     if as_json:
@@ -68,7 +68,7 @@ def tell(
 
 
 def tell_rerun(again: Rerun, as_json: bool, quiet: bool) -> None:
-    """A trial run again; exits with 1 where it differs."""
+    """Print the result of a rerun; exits with code 1 if it differs from the study."""
     same = not again.differences
     if as_json:
         files = [str(file) for file in again.files]

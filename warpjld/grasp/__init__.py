@@ -5,7 +5,7 @@ from warpjld.grasp.facet import FacetDistances, facet_distance
 from warpjld.grasp.object_file import load_object
 from warpjld.grasp.objects import GraspObject, Places, make_object
 from warpjld.grasp.search import FlexionSearch
-from warpjld.grasp.search_result import Found, SearchStatus
+from warpjld.grasp.search_result import SearchResult, SearchStatus
 from warpjld.grasp.searches import NEAREST, Searches
 from warpjld.grasp.validation import MeshReport
 
@@ -14,11 +14,11 @@ __all__ = [
     "Distances",
     "FacetDistances",
     "FlexionSearch",
-    "Found",
     "GraspObject",
     "MeshReport",
     "ObjectSet",
     "Places",
+    "SearchResult",
     "SearchStatus",
     "Searches",
     "facet_distance",

@@ -1,4 +1,4 @@
-"""How deep an arm lies in the rest of its body: samples along its bones against skin that stays where it is."""
+"""Penetration of an arm into the rest of its body: spheres along its bones against the skin of the posed body."""
 
 from __future__ import annotations
 
@@ -15,19 +15,22 @@ from warpjld.skeleton.arm import Arm
 __all__ = ["ArmClearance", "pierced_faces"]
 
 _UPPER, _FORE, _HAND = (0.6, 0.75, 0.9), (0.0, 0.2, 0.4, 0.6, 0.8), (0.0, 0.5, 1.0)
-"""Samples along the upper arm, whose first half is one with the trunk, along the forearm, and from the wrist on."""
+"""Places of the spheres along the upper arm, the forearm, and the line from wrist to palm, as fractions of each.
+
+The upper arm's first half merges with the trunk and has none.
+"""
 _SPACING = 0.015
-"""Longest edge of the triangles whose middles stand for the skin [m]."""
+"""Longest edge of the triangles whose centres sample the skin [m]."""
 _BESIDE = 0.15
-"""Part of a bone's length on both sides of a sample whose skin says how thick the arm is there."""
+"""Half-width of the window around a sphere, as a fraction of the bone, whose skin determines the sphere's radius."""
 _SHOULDER = 2.5
-"""Radii of the upper arm round the shoulder in which skin belongs to both."""
+"""Distance from the shoulder, in radii of the upper arm, within which skin belongs to both arm and trunk: ignored."""
 
 
 class ArmClearance:
-    """Depths of an arm's flesh in the skin of trunk, legs, head and the other arm, in one pose of these.
+    """Penetration depths of an arm in the skin of trunk, legs, head and the other arm, for one pose of the body.
 
-    The arm is a chain of spheres as thick as its flesh at rest; the skin is a cloud of points with normals.
+    The arm is approximated by a chain of spheres with the arm's radius at rest; the skin by points with normals.
 
     Args:
         covering: The body.
@@ -59,7 +62,12 @@ class ArmClearance:
         self._tree = cKDTree(self._middles)
 
     def __call__(self, positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depths of the samples [m], none below 0, shape (B, samples)."""
+        """Penetration depths of the spheres [m], 0 where a sphere is outside, shape (B, spheres).
+
+        Args:
+            positions: Joints of B poses of the arm [m], shape (B, chain, 3).
+            rotations: Their rotations from rest, quaternions x, y, z, w, shape (B, chain, 4).
+        """
         points = self._samples(positions, rotations)
         _, near = self._tree.query(points)
         away = points - self._middles[near]
@@ -75,7 +83,7 @@ class ArmClearance:
         return np.stack([a + share * (b - a) for a, b, shares in lines for share in shares], axis=1)
 
     def _thickness(self, covering: Covering) -> NDArray[np.float64]:
-        """Radius of the flesh about every sample at rest [m]."""
+        """Radius of the arm at every sphere at rest [m]."""
         arm, rest = self._arm, self._arm.skeleton.rest
         shoulder, elbow, wrist = (rest[arm.joints[k]] for k in (arm.shoulder, arm.elbow, arm.wrist))
         skin = covering.surface.vertices[self.own]
@@ -87,18 +95,18 @@ class ArmClearance:
             for at in shares:
                 beside = away[np.abs(share - at) < _BESIDE]
                 beside = beside[beside < np.linalg.norm(along)]
-                # of a section that is not round the thin side: an arm lies flat on what it touches
+                # a low percentile: where the cross-section is not round, the arm rests on its thin side
                 out.append(float(np.percentile(beside, 25)) if len(beside) else 0.0)
         return np.array(out)
 
 
 def pierced_faces(covering: Covering, arm: Arm, skin: NDArray[np.floating]) -> NDArray[np.int64]:
-    """Faces of the body that an arm's forearm or hand passes through.
+    """Faces of the body that are crossed by an arm's forearm or hand.
 
     Args:
         covering: The body.
         arm: One of its arms.
-        skin: Its surface in a pose [m], shape (V, 3).
+        skin: The body's surface in a pose [m], shape (V, 3).
     """
     faces = covering.surface.faces
     below = np.all(_own_vertices(covering, arm, whole=False)[faces], axis=1)
@@ -109,7 +117,7 @@ def pierced_faces(covering: Covering, arm: Arm, skin: NDArray[np.floating]) -> N
 
 
 def _own_vertices(covering: Covering, arm: Arm, *, whole: bool = True) -> NDArray[np.bool_]:
-    """Vertices on segments of an arm and its hand, or of those below the elbow only, shape (V,)."""
+    """Mask of the vertices on an arm and its hand, or only on those below the elbow, shape (V,)."""
     skeleton = arm.skeleton
     own = np.zeros(len(skeleton), dtype=bool)
     own[arm.joints[arm.shoulder if whole else arm.elbow]] = True

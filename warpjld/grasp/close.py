@@ -1,4 +1,4 @@
-"""Closing hands: their digits bend until their skin touches the object (A §7, R76; R90)."""
+"""Closing of hands on an object: digits flex until their skin touches it, many hands in one batch (A §7, R76; R90)."""
 
 from __future__ import annotations
 
@@ -10,37 +10,37 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.grasp.closing import ClosingHands, MovedSkin
+from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.give_way import give_way
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
-from warpjld.grasp.kept import kept_with
+from warpjld.grasp.keep_apart import keep_apart
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.grasp.search_result import SearchStatus
-from warpjld.grasp.separate import keep_apart
 from warpjld.skeleton import Poses
 
 __all__ = ["Closed", "Closer"]
 
-_ROUNDS = 4  # of bending and opening again
-_TOUCH = 1e-4  # skin this near touches [m]
-_PRESSED = 5e-4  # depth of an object's edges in the skin that stays [m]
-_THROUGH = 1e-3  # the same of a digit on its way [m]
-_QUICK = 3  # every third vertex searches at a first look
+_ROUNDS = 4  # largest number of rounds of flexing and opening again
+_TOUCH = 1e-4  # largest gap that counts as a touch [m]
+_PRESSED = 5e-4  # depth of the object's edges in the skin that is tolerated at the end [m]
+_THROUGH = 1e-3  # depth above which a digit counts as passing through the object on its way [m]
+_QUICK = 3  # every third vertex is searched when closing roughly
 
 
 @dataclass(frozen=True, eq=False)
 class Closed:
-    """Hands closed from G postures.
+    """Result of ``Closer.close`` for G hands.
 
     Attributes:
         angles: Joint angles [rad], shape (G, J, 4).
         digits: Names of the digits that closed, e.g. ``left.index``.
         status: Per digit and joint how its search ended (values of ``SearchStatus``), shape (G, D, 3); CONVERGED is a
             touch, NO_CONTACT the limit reached without one.
-        gap: Smallest signed distance of every digit's skin and the object [m], looked at from both sides (see
-            ``HandObjectGaps``), after a first look from the skin's only; shape (G, D).
-        penetration: Depth of digits, or of the palm, and object in one another [m], likewise, shape (G,).
+        gap: Smallest signed distance between every digit's skin and the object [m], measured both ways (see
+            ``HandObjectGaps``), after ``quick`` only from the skin's vertices; shape (G, D).
+        penetration: Largest penetration depth of digits or palm and object [m], measured likewise, shape (G,).
     """
 
     angles: NDArray[np.float64]
@@ -53,19 +53,19 @@ class Closed:
         return Closed(self.angles[hands], self.digits, self.status[hands], self.gap[hands], self.penetration[hands])
 
     def touching(self) -> NDArray[np.bool_]:
-        """Digits within a tenth of a millimetre of the object, shape (G, D)."""
+        """Mask of the digits within 0.1 mm of the object, shape (G, D)."""
         return np.asarray(self.gap < _TOUCH)
 
 
 class Closer:
-    """Closes one hand on one object, many postures at a time; what it knows of both it keeps.
+    """Closes one hand on one object, many postures at a time; keeps the search structures of both.
 
     Args:
         covering: The hand, smooth method.
         thing: The object.
 
     Attributes:
-        both: How deep the two are in one another.
+        both: Distances between this hand and object.
     """
 
     def __init__(self, covering: Covering, thing: GraspObject) -> None:
@@ -84,24 +84,24 @@ class Closer:
         quick: bool = False,
         tolerance: float = 1e-5,
     ) -> Closed:
-        """Close the digits of G hands. Each ends bit for bit as it does alone.
+        """Close the digits of G hands. The result of a hand is bit for bit the same in any batch.
 
-        Every digit bends at its base until a vertex beyond touches, then at its second joint, then at its third; a
-        joint whose skin touches already stays. With ``coupling`` all three bend together until the first touch, the
-        others at these times the base's rate; joints beyond the touch then go on together. Skin that swells as a finger
-        bends may enter the object beside a touch: the base then opens as far as it must, and the joints beyond close
-        again. What of the object, an edge or a corner, then is deeper than half a millimetre in the skin between its
-        vertices, opens the digit it is in (``give_way``).
+        Every digit flexes at its base until a vertex at or beyond that joint touches, then at its second joint, then at
+        its third; a joint whose skin touches already stays. With ``coupling`` all three flex together until the first
+        touch, the second and third at these rates relative to the base; then each joint flexes in turn as above. Skin
+        that swells as a finger flexes may enter the object beside a touch: the base then opens as far as necessary, and
+        the joints beyond it close again. Finally, a digit is opened while an edge or corner of the object is deeper
+        than 0.5 mm in its skin, which the skin's vertices alone do not detect (``give_way``).
 
         Args:
-            poses: G postures to start from, open.
+            poses: G open postures to start from.
             angles: Their joint angles [rad], shape (G, J, 4).
-            places: Place of every hand's object, or one for all; the object's own if left out.
+            places: Placement of the object for every hand, or one for all; the object's own if left out.
             digits: Names of digits; all if left out.
             coupling: Rates of the second and third joint relative to the base.
             apart: Stop digits that would pass through one another or the palm.
-            quick: For a first look at many hands: a third of the vertices search, and nothing opens again; ``apart`` is
-                left out.
+            quick: Close roughly, to rank many hands: only every third vertex is searched, nothing opens again, and
+                ``apart`` is ignored.
             tolerance: Distance that counts as a touch [m].
 
         Raises:
@@ -129,11 +129,11 @@ class Closer:
     def parted(
         self, poses: Poses, angles: NDArray[np.float64], closed: Closed, *, places: Places | None = None
     ) -> Closed:
-        """What hands would have closed to with ``apart``, from what they closed to without.
+        """Separate digits of hands that were closed without ``apart``; the result is as if closed with it.
 
         Args:
             poses: The open hands, as given to ``close``; likewise ``angles`` and ``places``.
-            closed: The answer.
+            closed: What ``close`` returned for them.
         """
         where = self._places(places, len(poses))
         hands = self._hands(poses, angles, where, every=1, tolerance=0.0)
@@ -176,10 +176,10 @@ class Closer:
 
 
 def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -> NDArray[np.int32]:
-    """Bend the joints of all digits (D, 3) one after another, opening in between what swelled into the object.
+    """Flex the joints of all digits (D, 3) one after another, and open those whose skin swelled into the object.
 
     Returns:
-        How the joints' searches ended, shape (G, D, 3).
+        ``SearchStatus`` of the joints' searches, shape (G, D, 3).
     """
     status = np.full((len(hands), *joints.shape), int(SearchStatus.NO_CONTACT), dtype=np.int32)
     going = np.arange(len(hands))
@@ -187,7 +187,7 @@ def _bend_in_turn(hands: ClosingHands, joints: NDArray[np.int64], rounds: int) -
         for k in range(1 if again else 0, 3):
             # a joint with a touch at or beyond its segment finds it at once and stays
             ended = hands.bend(going, joints[:, k:], np.array([1.0, 0.0, 0.0])[: 3 - k])
-            # skin left inside by less than twice the tolerance is a touch
+            # skin that ``settle`` leaves inside, by less than twice the tolerance, counts as a touch
             ended = np.where(ended == int(SearchStatus.INSIDE), int(SearchStatus.CONVERGED), ended) if again else ended
             status[going, :, k] = ended
         if rounds == 1:

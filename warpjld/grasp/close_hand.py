@@ -1,4 +1,4 @@
-"""One hand closed on one object, where and as it is held open."""
+"""Closing of one hand on one object from a given open pose."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ __all__ = ["ClosedHand", "close_hand"]
 
 @dataclass(frozen=True, eq=False)
 class ClosedHand:
-    """A hand that closed on an object.
+    """Result of ``close_hand``.
 
     Attributes:
         poses: The closed hand, one frame.
         angles: Its joint angles [rad], shape (J, 4).
-        gap: Smallest signed distance of every digit's skin and the object [m], by the digit's name.
-        status: How the search of each of a digit's joints ended, base first, by the digit's name: CONVERGED touches,
-            NO_CONTACT came to its limit without a touch, BLOCKED stopped at another digit or the palm.
-        touching: Digits within a tenth of a millimetre of the object.
-        penetration: Depth of digits, or of the palm, and object in one another [m].
+        gap: Smallest signed distance between each digit's skin and the object [m], by the digit's name.
+        status: Status of the search of each of a digit's joints, base first, by the digit's name: CONVERGED: it
+            touches; NO_CONTACT: it reached its limit without a touch; BLOCKED: another digit or the palm stopped it.
+        touching: Names of the digits within 0.1 mm of the object.
+        penetration: Largest penetration depth of digits or palm and object [m].
     """
 
     poses: Poses
@@ -61,13 +61,13 @@ def close_hand(
 
     Args:
         covering: The hand, smooth method.
-        thing: The object, where it stands.
+        thing: The object at its own placement.
         angles: Joint angles of the open hand [rad], shape (J, 4); the rest pose if left out.
         position: Displacement of the skeleton's root from rest [m], shape (3,).
         rotation: Rotation of the root about its rest place, unit quaternion x, y, z, w.
         digits: Digits that close, as ``left.index``; all if left out.
-        coupling: Rates of the second and third joint relative to the base's, where joints bend together; else they bend
-            one after another.
+        coupling: Rates of the second and third joint relative to the base's, if the joints are to flex together; else
+            they flex one after another.
         apart: Stop digits that would pass through one another or the palm.
 
     Raises:
@@ -91,8 +91,8 @@ def close_hand(
     if place.shape != (3,) or turn.shape != (4,):
         raise InputError(f"position, rotation: want shapes (3,) and (4,), got {place.shape} and {turn.shape}")
 
-    def posed(some: NDArray[np.float64]) -> Poses:
-        return poses_from_angles(skeleton, some, root_position=place[None], root_rotation=turn[None])
+    def posed(hand: NDArray[np.float64]) -> Poses:
+        return poses_from_angles(skeleton, hand, root_position=place[None], root_rotation=turn[None])
 
     closed = Closer(covering, thing).close(
         posed(start[None]), start[None], digits=digits, coupling=coupling, apart=apart

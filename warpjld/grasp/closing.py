@@ -1,4 +1,7 @@
-"""Hands on their way: bending joints until the first touch, and opening them where swelling skin went too far."""
+"""Closing motion of a batch of hands: flex joints until the first touch, reopen where skin swelled into the object.
+
+The searches run in the kernels ``first_touch`` and ``least_opening``.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +24,13 @@ from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["ClosingHands", "MovedSkin"]
 
-_MOST_JOINTS = 4
-_WIDEST = 0.35  # how far a base joint may open again for the sake of swelling skin [rad]
-_CUTS, _PIECES = 3, 8  # the opening is found to a 512th of that
+_MOST_JOINTS = 4  # of a chain in the kernels
+_WIDEST = 0.35  # largest angle by which a base joint opens again because of swelling skin [rad]
+_CUTS, _PIECES = 3, 8  # the interval is cut 3 times into 8 pieces: the opening is found to 1/512 of _WIDEST
 
 
 class MovedSkin:
-    """The skin of one hand as searches want it, and which of it moves with which joint.
+    """The skin of one hand prepared for the search kernels, with the vertices that each joint moves.
 
     Args:
         covering: The hand, smooth method.
@@ -57,19 +60,19 @@ class MovedSkin:
 
 
 class ClosingHands:
-    """G hands on one object. What becomes of a hand does not depend on those beside it.
+    """State of G hands that close on one object. The result of a hand does not depend on the others in the batch.
 
     Args:
-        skin: The hand's.
-        poses: G postures to start from, open.
+        skin: The hand's skin.
+        poses: G open postures to start from.
         angles: Their joint angles [rad], shape (G, J, 4).
         near: The object.
-        places: Its place for every hand.
-        every: Every so many vertices search for a touch.
+        places: Its placement for every hand.
+        every: Stride: only every ``every``-th vertex is searched.
         tolerance: Distance that counts as a touch [m].
 
     Attributes:
-        angles: As they are now, shape (G, J, 4).
+        angles: Present joint angles [rad], shape (G, J, 4).
 
     Raises:
         InputError: Postures of another skeleton.
@@ -111,7 +114,7 @@ class ClosingHands:
         return self._skin.covering.deform(self.poses_of(hands, angles), threads=1)
 
     def skin_gaps(self, bases: list[int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """How far the skin is from the object, the object's edges left aside.
+        """Distances from the skin's vertices to the object; edges of the object inside the skin are not detected.
 
         Args:
             bases: First joints of D digits.
@@ -131,10 +134,10 @@ class ClosingHands:
     def bend(
         self, hands: NDArray[np.int64], joints: NDArray[np.int64], rates: NDArray[np.float64]
     ) -> NDArray[np.int32]:
-        """Bend the joints of every digit (D, k) of n hands at these rates until the first touch.
+        """Flex the joints of every digit (D, k) of n hands at these relative rates (k,) until the first touch.
 
         Returns:
-            How each ended, shape (n, D).
+            ``SearchStatus`` of every digit, shape (n, D).
         """
         import warp as wp
         from warpjld_kernels.first_touch import first_touch
@@ -171,10 +174,13 @@ class ClosingHands:
         return status
 
     def settle(self, hands: NDArray[np.int64], bases: list[int]) -> NDArray[np.bool_]:
-        """Open base joints of n hands where skin that swelled has entered the object; which had to, shape (n,).
+        """Open base joints of n hands where swelling skin has entered the object.
 
-        Skin that an open hand already had inside need not come out farther than it was. Where two digits press the
-        same skin in, such as the fold between two fingers, the one whose opening moves it most gives way.
+        A vertex that was inside already when the hand was open need not come out farther than it was then. Where two
+        digits move the same skin, such as the fold between two fingers, the one whose opening moves it most is opened.
+
+        Returns:
+            Mask of the hands with skin in the object, shape (n,).
         """
         vertices = self._skin.moving(tuple(bases))
         if self._floor is None:
@@ -186,11 +192,11 @@ class ClosingHands:
             return np.zeros(len(hands), dtype=bool)
         pressed, deep, allowed = vertices[columns], now[rows, columns], self._floor[hands][rows, columns]
         at_widest = self._opened_distances(hands, bases, rows, pressed)
-        # a vertex is brought out by the digit whose opening moves it most
+        # of the digits, the one whose opening moves the vertex out most
         gain = at_widest - deep
-        culprit = np.where(gain.max(axis=0) > 1e-6, gain.argmax(axis=0), -1)
+        responsible = np.where(gain.max(axis=0) > 1e-6, gain.argmax(axis=0), -1)
         for d, base in enumerate(bases):
-            own = culprit == d
+            own = responsible == d
             if own.any():
                 floor = np.minimum(allowed[own], at_widest[d, own] - 1e-7)
                 self._open_enough(hands, base, rows[own], pressed[own], floor)
@@ -204,13 +210,13 @@ class ClosingHands:
         vertices: NDArray[np.int32],
         floor: NDArray[np.float64],
     ) -> None:
-        """Open a base joint as far as brings vertices (n,) of hands (n,) to their least distances (n,)."""
+        """Open a base joint until vertices (n,) of hands ``rows`` (n,) reach the distances ``floor`` (n,) [m]."""
         import warp as wp
         from warpjld_kernels.first_touch import least_opening
 
-        some, first = np.unique(rows, return_index=True)
-        packed = self._opening(hands[some], [base])
-        by = np.zeros(len(some), dtype=np.float32)
+        affected, first = np.unique(rows, return_index=True)
+        packed = self._opening(hands[affected], [base])
+        by = np.zeros(len(affected), dtype=np.float32)
         inputs = [
             array_on("cpu", vertices, wp.int32),
             array_on("cpu", floor, float),
@@ -220,20 +226,20 @@ class ClosingHands:
             _PIECES,
         ]
         outs = [wp.array(by, dtype=float, device="cpu", copy=False)]
-        wp.launch(least_opening, len(some), inputs=[packed, *inputs], outputs=outs, device="cpu")
-        now, start = self.angles[hands[some], base, FLEXION], self._open[hands[some], base, FLEXION]
-        self.angles[hands[some], base, FLEXION] = np.maximum(now - by, np.minimum(start, now))
+        wp.launch(least_opening, len(affected), inputs=[packed, *inputs], outputs=outs, device="cpu")
+        now, start = self.angles[hands[affected], base, FLEXION], self._open[hands[affected], base, FLEXION]
+        self.angles[hands[affected], base, FLEXION] = np.maximum(now - by, np.minimum(start, now))
 
     def _opened_distances(
         self, hands: NDArray[np.int64], bases: list[int], rows: NDArray[np.int64], vertices: NDArray[np.int32]
     ) -> NDArray[np.float64]:
-        """Signed distances of vertices (n,) of hands (n,) with each base joint opened as far as it may [m], (D, n)."""
+        """Signed distances of vertices (n,) of hands (n,) with each base joint opened by ``_WIDEST`` [m], (D, n)."""
         import warp as wp
         from warpjld_kernels.first_touch import distances_at
 
-        some, row = np.unique(rows, return_inverse=True)
-        packed = self._opening(hands[some], bases)
-        chain = np.arange(len(bases))[:, None] * len(some) + row
+        affected, row = np.unique(rows, return_inverse=True)
+        packed = self._opening(hands[affected], bases)
+        chain = np.arange(len(bases))[:, None] * len(affected) + row
         out = np.empty(chain.shape, dtype=np.float32)
         inputs = [
             array_on("cpu", chain.ravel(), wp.int32),
@@ -245,7 +251,7 @@ class ClosingHands:
         return out.astype(np.float64)
 
     def _opening(self, hands: NDArray[np.int64], bases: list[int]) -> Any:
-        """Hands of which base joints open, row d · n + i joint d of hand i, no farther than it began."""
+        """Kernel input for opening base joints: row d · n + i is joint d of hand i, which stops at its open angle."""
         count = len(hands)
         frames, joints = np.tile(np.arange(count), len(bases)), np.repeat(bases, count)
         own = hands[frames], joints, FLEXION
@@ -260,7 +266,7 @@ class ClosingHands:
         rates: NDArray[np.float64],
         stops: NDArray[np.float64] | None = None,
     ) -> Any:
-        """``warpjld_kernels.first_touch.Hands`` with chains (R, k) in frames (R,) of n hands."""
+        """``warpjld_kernels.first_touch.Hands``: R chains of k joints, each in one of the frames of n hands."""
         import warp as wp
         from warpjld_kernels.first_touch import Hands
 
@@ -289,8 +295,7 @@ class ClosingHands:
     def _depths(
         self, hands: NDArray[np.int64], vertices: NDArray[np.int32], angles: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Signed distances of some vertices of n hands where they are in the object [m], +inf where surely not, shape
-        (n, vertices)."""
+        """Signed distances of vertices of n hands to the object [m], +inf where surely outside, shape (n, vertices)."""
         points = self._skin.covering.points(self.poses_of(hands, angles), vertices)
         local = np.stack([self._places[h].to_local(own)[0] for h, own in zip(hands, points, strict=True)])
         found = self._near.near(local.reshape(-1, 3), 0.0)

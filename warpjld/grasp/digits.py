@@ -1,4 +1,4 @@
-"""The digits of a skeleton: their joints, and the middles of their pads."""
+"""Digits of a skeleton: chains of flexion joints, and the vertex in the middle of each pad."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from warpjld.skeleton.digits import digit_joints
 
 __all__ = ["digit_chains", "pad_vertex"]
 
-_KNUCKLES = 3  # joints of a digit that can close round an object
+_KNUCKLES = 3  # flexion joints that a digit must have to be closed
 
 
 def digit_chains(skeleton: Skeleton, digits: Sequence[str] = ()) -> dict[str, tuple[int, ...]]:
-    """Flexion joints of the digits of a skeleton, base first; of all, or of those named (``index``, ``left.index``).
+    """Flexion joints of digits by name, base first; of all digits, or of those named (``index``, ``left.index``).
 
     Raises:
         InputError: There is no such digit, or none at all.
@@ -38,7 +38,7 @@ def digit_chains(skeleton: Skeleton, digits: Sequence[str] = ()) -> dict[str, tu
 
 
 def pad_vertex(covering: Covering, digit: str) -> int:
-    """The vertex in the middle of a digit's pad: on the internal side of its last segment, three fifths along.
+    """Vertex in the middle of a digit's pad: on the palmar side of its last segment, at 60 % of its length.
 
     Raises:
         InputError: There is no such digit.
@@ -49,7 +49,7 @@ def pad_vertex(covering: Covering, digit: str) -> int:
     rows = np.arange(len(anchors))
     on_last = anchors.ends[anchors.segment[rows, strongest], 0] == chain[-1]
     ratio, side = anchors.ratio[rows, strongest], anchors.side[rows, strongest]
-    # of vertices alike in ratio the one farthest out on the internal side
+    # of vertices with similar ratio, the one farthest from the bone on the palmar side
     table = SegmentTable.build(covering.skeleton, anchors.ends)
     height = np.linalg.norm(table.heights(anchors.rest, anchors.segment[rows, strongest]), axis=1)
     length = np.linalg.norm(np.ptp(covering.surface.vertices[on_last], axis=0))

@@ -1,4 +1,4 @@
-"""How far points are from objects: the nearest points of their surfaces, inside or outside (C19)."""
+"""Signed distances and closest points from points to objects (C19)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from warpjld.runtime.threads import in_threads, threads_for
 
 __all__ = ["Distances", "ObjectSet", "finite_points"]
 
-_SPLIT_BELOW = 2_000  # points a thread must have before splitting pays
+_SPLIT_BELOW = 2_000  # points per thread below which work is not split further
 
 
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """Nearest points of surfaces.
+    """Signed distances and closest points of R rows of n points.
 
     Attributes:
         distance: Signed distance [m], negative inside, shape (R, n); +inf where nothing lies within the limit.
@@ -37,10 +37,10 @@ class Distances:
 
 
 class ObjectSet:
-    """Search structures of some objects on a device; built once, used by distances and searches.
+    """Search structures of objects on a device; built once, used by distances and searches.
 
     Args:
-        objects: Their numbers are their places in this sequence.
+        objects: One or more; an object's number is its index here.
         device: Warp device.
 
     Attributes:
@@ -79,14 +79,18 @@ class ObjectSet:
         return len(self.objects)
 
     def check(self, which: ArrayLike) -> NDArray[np.int32]:
-        """Object numbers as an array; InputError where one does not exist."""
+        """Object numbers as an array.
+
+        Raises:
+            InputError: A number that does not exist.
+        """
         numbers = np.atleast_1d(np.asarray(which, dtype=np.int32))
         if numbers.size and (numbers.min() < 0 or numbers.max() >= len(self)):
             raise InputError(f"objects: numbers go from 0 to {len(self) - 1}")
         return numbers
 
     def places(self, which: ArrayLike) -> Places:
-        """Where objects stand at first, one place for each number."""
+        """The objects' own placements, one for each number."""
         own = [self.objects[k].place for k in self.check(which)]
         return Places(np.concatenate([p.position for p in own]), np.concatenate([p.rotation for p in own]))
 
@@ -101,14 +105,14 @@ class ObjectSet:
         nearest: bool = False,
         threads: int | None = None,
     ) -> Distances:
-        """Signed distances of sets of points to objects at places, R rows in one launch.
+        """Signed distances of sets of points to placed objects, R rows in one launch.
 
-        A row takes one set of points, one object and one place; each of the three is given once or R times.
+        A row combines one set of points, one object and one placement; each of the three is given once or R times.
 
         Args:
-            points: On the stage [m], shape (n, 3) or (S, n, 3).
-            which: Object of every row.
-            places: Place of every row; the objects' own if left out.
+            points: World positions [m], shape (n, 3) or (S, n, 3).
+            which: Object number of every row.
+            places: Placement of every row; the objects' own if left out.
             sets: Set of points of every row; by default row k takes set k, or all rows the only one.
             limit: Distances beyond it are not computed [m].
             nearest: Also give the nearest points.
@@ -194,7 +198,7 @@ def _tree_on(device: Any, things: Sequence[GraspObject]) -> Any:
 
 
 def _features(thing: GraspObject) -> NDArray[np.float64]:
-    """Feature normals; only the faces' own where winding numbers tell inside from outside."""
+    """Pseudonormals (t, 7, 3); only the faces' own where winding numbers decide between inside and outside."""
     if thing.report.solid:
         return feature_normals(thing.vertices, thing.faces)
     out = np.zeros((len(thing.faces), 7, 3))
@@ -203,7 +207,11 @@ def _features(thing: GraspObject) -> NDArray[np.float64]:
 
 
 def finite_points(points: ArrayLike) -> NDArray[np.float64]:
-    """Points (n, 3) or sets of points (S, n, 3) as an array, or an InputError that says what is wrong with them."""
+    """Points (n, 3) or sets of points (S, n, 3) as an array.
+
+    Raises:
+        InputError: Wrong shape, or a number that is not finite.
+    """
     array = np.asarray(points)
     if array.ndim not in (2, 3) or array.shape[-1] != 3:
         raise InputError(f"points: want shape (n, 3) or (sets, n, 3), got {array.shape}")

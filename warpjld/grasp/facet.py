@@ -1,4 +1,4 @@
-"""Distance process of the paper: points in the basis of a chosen facet (A §7.1, R73)."""
+"""Distance process of paper A: coordinates of points in the basis of a chosen facet (A §7.1, R73)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class FacetDistances:
 
     Attributes:
         coordinates: x along the facet's first edge, y along its normal, z = x × y [m], shape (…, 3). y is the
-            distance: negative behind the facet; x and z are the lateral place.
+            signed distance to its plane, negative behind the facet; x and z are the lateral position.
         inside: Whether the foot of the perpendicular lies in the facet, borders included, shape (…) (C19).
     """
 
@@ -33,12 +33,12 @@ class FacetDistances:
 
 
 def facet_distance(points: ArrayLike, thing: GraspObject, facet: int, place: Places | None = None) -> FacetDistances:
-    """Points on the stage represented in a facet's basis.
+    """Coordinates of world points in a facet's basis.
 
     Args:
-        points: On the stage [m], shape (n, 3) or (sets, n, 3).
+        points: World positions [m], shape (n, 3) or (sets, n, 3).
         thing: The object.
-        facet: Row of its faces; ``thing.triangles_of`` leads there from the file's facet.
+        facet: Triangle, a row of ``thing.faces``; ``thing.triangles_of`` converts the file's facet numbers.
         place: One placement; the object's own if left out.
 
     Raises:
@@ -54,7 +54,7 @@ def facet_distance(points: ArrayLike, thing: GraspObject, facet: int, place: Pla
 
 
 def facet_axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bases of triangles with corners (n, 3, 3): rows x along the first edge, y the normal, z = x × y; (n, 3, 3)."""
+    """Bases (n, 3, 3) of triangles with corners (n, 3, 3): rows x along the first edge, y the normal, z = x × y."""
     edge = corners[:, 1] - corners[:, 0]
     x = edge / np.linalg.norm(edge, axis=1, keepdims=True)
     y = np.cross(edge, corners[:, 2] - corners[:, 0])
@@ -67,8 +67,8 @@ def inside_facets(corners: NDArray[np.float64], feet: NDArray[np.floating], *, s
 
     Args:
         corners: Of one triangle, shape (1, 3, 3), or of one for every foot, shape (n, 3, 3) [m].
-        feet: Lateral places x and z in the triangle's basis, its first corner the origin [m], shape (n, 2).
-        slack: What still counts as the border, as a share of the triangle's longest side: the precision of the feet.
+        feet: Lateral coordinates x and z in the triangle's basis, its first corner the origin [m], shape (n, 2).
+        slack: Width of the border relative to the triangle's longest side: the precision of the feet.
 
     Returns:
         Shape (n,).

@@ -1,4 +1,4 @@
-"""Normals of a surface's triangles, edges and corners: they tell inside from outside at a nearest point."""
+"""Pseudonormals of triangles, edges and vertices: the sign of the distance at a closest point (Bærentzen & Aanæs)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def face_normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def feature_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Normals of every triangle, of its edges opposite to corner 0, 1, 2, and of its corners, shape (t, 7, 3).
+    """Pseudonormals of every triangle, of its edges opposite to corner 0, 1, 2, and of its corners, shape (t, 7, 3).
 
-    An edge has the sum of the normals at it, a corner their sum weighted by angle (Bærentzen and Aanæs 2005).
-    Triangles without area have none and add none.
+    An edge has the sum of the normals of its triangles, a corner their angle-weighted sum (Bærentzen & Aanæs 2005).
+    Not normalised except those of triangles. Degenerate triangles have zero normals and contribute nothing.
     """
     corner = vertices[faces]
     normal = face_normals(corner)

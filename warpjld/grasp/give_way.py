@@ -1,4 +1,4 @@
-"""Digits open again where the object cuts into their skin, and do not pass through it on their way."""
+"""Limits of the closing motion: digits neither pass through the object nor end with its edges deep in their skin."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 __all__ = ["give_way"]
 
-_WAY = (0.25, 0.5, 0.75, 0.9)  # parts of the way at which digits must not be in the object
-_HALVINGS = 7
+_WAY = (0.25, 0.5, 0.75, 0.9)  # fractions of the closing motion at which digits must not be in the object
+_HALVINGS = 7  # bisection steps: the motion is limited to within 1/128
 
 
 def give_way(
@@ -23,22 +23,22 @@ def give_way(
     allowed: float,
     on_the_way: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Open digits that the object cuts into, as far as they must and no farther than they began.
+    """Open digits that the object penetrates, as far as necessary and at most to their open angles.
 
-    All joints go their way together. A digit is stopped where its depth at the end is allowed, and before the first
-    place on the way at which it would pass through the object.
+    All joints of a digit move together, linearly from open (0) to closed (1). A digit is stopped where its final depth
+    is allowed, and before the first sampled fraction at which it would pass through the object.
 
     Args:
-        depths: Of some of G hands (n,) with joint angles (n, J, 4), by part [m], shape (n, parts).
+        depths: Function from hands (n,) and joint angles (n, J, 4) to penetration depths by part [m], (n, parts).
         parts: Names of these parts.
         start: Angles of the open hands [rad], shape (G, J, 4).
         closed: Angles of the closed hands [rad], shape (G, J, 4).
         chains: Joints of D digits, see ``digit_chains``.
-        allowed: Depth that stays at the end [m].
-        on_the_way: Depth above which a digit passes through the object [m].
+        allowed: Largest depth at the end [m].
+        on_the_way: Depth above which a digit counts as passing through the object [m].
 
     Returns:
-        Angles, shape (G, J, 4), and the part of their way that digits went, shape (G, D).
+        Angles [rad], shape (G, J, 4), and the fraction of the closing motion of every digit, shape (G, D).
     """
     digits = [d for d, digit in enumerate(chains) if digit in parts]
     columns = [parts.index(digit) for digit in chains if digit in parts]
@@ -61,10 +61,10 @@ def give_way(
     cut = np.zeros(high.shape, dtype=bool)
     cut[:, digits] = depths(hands, angles_at(hands, high))[:, columns] > allowed
     low = np.where(cut, 0.0, high)
-    some = np.flatnonzero(cut.any(axis=1))
-    for _ in range(_HALVINGS if len(some) else 0):
-        middle = 0.5 * (low[some] + high[some])
+    limited = np.flatnonzero(cut.any(axis=1))
+    for _ in range(_HALVINGS if len(limited) else 0):
+        middle = 0.5 * (low[limited] + high[limited])
         deep = np.zeros(middle.shape, dtype=bool)
-        deep[:, digits] = depths(some, angles_at(some, middle))[:, columns] > allowed
-        low[some], high[some] = np.where(deep, low[some], middle), np.where(deep, middle, high[some])
+        deep[:, digits] = depths(limited, angles_at(limited, middle))[:, columns] > allowed
+        low[limited], high[limited] = np.where(deep, low[limited], middle), np.where(deep, middle, high[limited])
     return angles_at(hands, low), low

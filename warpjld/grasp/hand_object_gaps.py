@@ -1,4 +1,4 @@
-"""How deep hand and object are in one another, looked at from both sides, by part of the hand."""
+"""Gaps and penetration depths of a hand and an object by part of the hand, measured in both directions."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering import Covering
+from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.kept import kept_with
 from warpjld.grasp.moving_skin import share_moved
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
@@ -17,17 +17,17 @@ from warpjld.grasp.posed_skins import PosedSkins
 
 __all__ = ["HandObjectGaps"]
 
-_DEEPEST = 0.015  # of the object what lies deeper in the skin or farther from it is not measured [m]
-_NEAR = 2e-3  # points this far from a hand's bounding box matter [m]
-_SWELLS = 0.02  # share of a digit from which skin of the palm counts as moved by it
+_DEEPEST = 0.015  # points of the object deeper in the skin, or farther from it, are ignored [m]
+_NEAR = 2e-3  # points of the object farther from the hand's bounding box are ignored [m]
+_SWELLS = 0.02  # weight of a digit's operators above which skin of the palm counts as moved by that digit
 
 
 class HandObjectGaps:
     """Distances between poses of one hand and an object.
 
-    A hand's vertices say how far skin is from the object, or how deep in it; the object's vertices and points of its
-    sharp edges (see ``outline_points``) say how deep the object is in the skin, which the vertices of a coarse finger
-    do not see.
+    Measured in both directions: from the hand's vertices to the object, and from the object's vertices and points on
+    its sharp edges (see ``outline_points``) to the skin. The second finds edges that enter the skin between its
+    vertices.
 
     Args:
         covering: The hand.
@@ -51,24 +51,24 @@ class HandObjectGaps:
 
         Args:
             vertices: Deformed skins [m], shape (P, V, 3).
-            places: Where the object is, once or for each; its own place if left out.
+            places: Placement of the object, one for all or one for each; its own if left out.
         """
         return self._least(vertices, places, np.inf, self._owners)
 
     def depths(
         self, vertices: NDArray[np.floating], places: Places | None = None, *, moved: bool = False
     ) -> NDArray[np.float64]:
-        """Depth of the deepest point by part [m], 0 where none is, shape (P, parts); sooner found than ``gaps``.
+        """Penetration depth by part [m], 0 where nothing is inside, shape (P, parts); faster than ``gaps``.
 
         Args:
             vertices: Deformed skins [m], shape (P, V, 3).
-            places: Where the object is, once or for each; its own place if left out.
-            moved: Count skin of the palm that swells when a digit bends as that digit's.
+            places: Placement of the object, one for all or one for each; its own if left out.
+            moved: Attribute skin of the palm that a digit moves (it swells as the digit flexes) to that digit.
         """
         return -self._least(vertices, places, 0.0, self._movers if moved else self._owners)
 
     def depth_of_object(self, vertices: NDArray[np.floating]) -> float:
-        """Depth of the object's deepest point in a deformed skin (V, 3) [m], 0 where none is, at its own place."""
+        """Depth of the object's deepest point in a deformed skin (V, 3) [m], 0 where none is inside."""
         skins, gaps = self._skins.fitted(vertices[None], self.thing.place), np.zeros((1, len(self.parts)))
         self._skins.least_distances(skins, self._points, self._owners[0], gaps, near=_NEAR, limit=np.inf, outside=False)
         return -float(gaps.min())
@@ -80,7 +80,7 @@ class HandObjectGaps:
         most: float,
         owners: tuple[NDArray[np.int32], NDArray[np.int32]],
     ) -> NDArray[np.float64]:
-        """Smallest signed distances by part where they are below ``most``, else that."""
+        """Smallest signed distances by part, clipped from above at ``most``."""
         of_face, of_vertex = owners
         where = self.thing.place if places is None else places
         where = where[np.zeros(len(vertices), dtype=int)] if len(where) == 1 else where
@@ -96,7 +96,10 @@ class HandObjectGaps:
 
 
 class _Owners:
-    """Parts that faces (T,) and vertices (V,) count as: their own, or that of the digit that moves them."""
+    """Part of every face (T,) and vertex (V,): the one they belong to (``owners``), and the one that moves them.
+
+    The latter (``movers``) differ for skin of the palm that a digit moves.
+    """
 
     def __init__(self, covering: Covering) -> None:
         parts, faces = kept_with(covering, PosedSkins).parts, covering.surface.faces

@@ -1,4 +1,4 @@
-"""Objects of a size that no hand can have to do with: a file in another unit than it was read in."""
+"""Plausibility of an object's size beside a hand: finds files that were read in the wrong unit."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from warpjld.skeleton import Skeleton
 
 __all__ = ["doubt_of_size", "hand_length"]
 
-_LARGER, _SMALLER = 20.0, 1.0 / 50.0  # an object's longest side over the hand's length: beyond is no object in a hand
-_USUAL = 0.19  # a hand's length where none is known [m]
+_LARGER, _SMALLER = 20.0, 1.0 / 50.0  # largest and smallest plausible ratio of the object's longest side to the hand
+_USUAL = 0.19  # length of an adult hand, taken where there is no hand to measure [m]
 
 
 def hand_length(skeleton: Skeleton) -> float | None:
-    """Distance at rest from the wrist to the tip of the middle finger [m], of the longer hand; None without hands."""
+    """Distance at rest from wrist to tip of the middle finger [m], of the longer hand; None without a hand."""
     found = [
         float(((skeleton.rest[skeleton.index(wrist)] - skeleton.rest[skeleton.index(tip)]) ** 2).sum() ** 0.5)
         for wrist, tip in ((f"{side}.wrist", f"{side}.middle.tip") for side in ("left", "right"))
@@ -27,13 +27,13 @@ def hand_length(skeleton: Skeleton) -> float | None:
 def doubt_of_size(
     thing: GraspObject, hand: float | None, unit: str | None, say_unit: Callable[[str], str] = "UNIT {}".format
 ) -> str | None:
-    """What is odd about an object's size beside a hand's, and the units with which it would not be; None if nothing.
+    """Message about an implausible size, with the units that would make it plausible; None if the size is plausible.
 
     Args:
         thing: The object as it was read.
-        hand: The hand's length [m]; None: that of a usual one.
-        unit: Unit that the file was read in, one of ``UNITS``; None where it has none to choose.
-        say_unit: How one chooses a unit given in upper case.
+        hand: The hand's length [m]; None: 0.19 m.
+        unit: Unit that the file was read in, one of ``UNITS``; None where the unit cannot be chosen.
+        say_unit: Formats the option that chooses a unit, which it is given in upper case.
     """
     size, length = float(thing.size.max()), _USUAL if hand is None else hand
     if not min(length, size) > 0.0 or _SMALLER * length < size < _LARGER * length:
@@ -43,4 +43,4 @@ def doubt_of_size(
     others = {other: size * UNITS[other] / UNITS[unit] for other in ("m", "cm", "mm")} if unit else {}
     fitting = {u: s for u, s in others.items() if _SMALLER * length < s < _LARGER * length}
     hints = [f"{say_unit(u.upper())} would make it {s:.3g} m" for u, s in fitting.items()]
-    return f"measures {size:.4g} m, {times} {whose} {length:.3g} m: {', '.join(hints) or 'no unit mends that'}"
+    return f"measures {size:.4g} m, {times} {whose} {length:.3g} m: {', '.join(hints) or 'no unit makes it fit a hand'}"

@@ -1,4 +1,4 @@
-"""What of a hand lies inside an object: vertices, depths and volume (A §7.2, R75), and what touches."""
+"""Intersection of a hand and an object: vertices inside, depths and common volume (A §7.2, R75); parts in contact."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.errors import InputError
-from warpjld.grasp.kept import kept_with
+from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.posed_skins import PosedSkins
@@ -17,17 +17,17 @@ from warpjld.suggest import did_you_mean
 
 __all__ = ["Contact", "Intersection", "contacts", "intersection", "intersection_beside", "part_vertices"]
 
-_CELLS = 48  # grid cells along the longest side of the overlap
-_FINEST = 2e-4  # their smallest edge [m]
+_CELLS = 48  # cells of the volume's grid along the longest side of the overlap
+_FINEST = 2e-4  # smallest edge of these cells [m]
 
 
 @dataclass(frozen=True, eq=False)
 class Intersection:
-    """What of a part lies inside an object.
+    """The vertices of a part that lie inside an object, and the common volume.
 
     Attributes:
-        vertices: Vertices inside, rows of the surface's, shape (n,); ``surface.numbers`` has the file's own.
-        depths: How deep [m], positive, shape (n,).
+        vertices: Indices of the surface's vertices inside, shape (n,); ``surface.numbers`` has the file's own.
+        depths: Their depths [m], positive, shape (n,).
         volume: Common volume [m³]: the midpoint rule on a grid over the overlap, cells at either surface counted by
             the share that a plane at their signed distance cuts off, Σ h³ c(d_hand) c(d_object) with
             c(d) = clamp(½ − d / h, 0, 1).
@@ -55,12 +55,13 @@ class Intersection:
 
 @dataclass(frozen=True)
 class Contact:
-    """Where one part of a hand touches an object.
+    """Contact of one part of a hand with an object.
 
     Attributes:
-        part: E.g. ``left.index``, ``left.palm``.
-        vertices: Vertices nearer than the tolerance, those inside included; 0 where an edge touches between them.
-        deepest: Largest depth of part and object in one another [m], seen from both sides; 0 where none.
+        part: Name of the part, e.g. ``left.index``, ``left.palm``.
+        vertices: Number of vertices nearer than the tolerance, those inside included; 0 where an edge of the object
+            touches between them.
+        deepest: Largest penetration depth [m], measured in both directions; 0 where there is none.
         nearest: Smallest signed distance [m], likewise.
     """
 
@@ -71,8 +72,9 @@ class Contact:
 
 
 def part_vertices(covering: Covering, part: str | None) -> NDArray[np.int32]:
-    """Vertices of a segment (``index.knuckle2``: the one that begins at that joint), a digit (``index``), ``palm``,
-    or of everything (None).
+    """Indices of the vertices of a part of the surface.
+
+    ``index.knuckle2`` is the segment that begins at that joint, ``index`` a digit, ``palm`` the palm, None everything.
 
     Raises:
         InputError: There is no such part; suggests the nearest.
@@ -105,12 +107,12 @@ def intersection(
     """Intersection process (A §7.2): the distance of every vertex of a part to an object.
 
     Args:
-        covering: Whose parts and faces.
+        covering: The hand's covering, which defines parts and faces.
         vertices: The deformed surface [m], shape (V, 3).
         thing: The object.
         place: One placement; the object's own if left out.
         part: Segment or digit, see :func:`part_vertices`; everything if left out.
-        spacing: Edge of the volume's grid cells [m]; by default a 48th of the overlap, 0.2 mm at least.
+        spacing: Edge of the volume's grid cells [m]; by default 1/48 of the overlap's longest side, at least 0.2 mm.
 
     Raises:
         InputError: No such part, or a surface of another size.
@@ -129,7 +131,7 @@ def intersection_beside(
     part: str | None = None,
     spacing: float | None = None,
 ) -> Intersection:
-    """The same of a surface (V, 3) in the object's frame [m], with what is known of the object."""
+    """``intersection`` of a surface (V, 3) in the object's frame [m], with search structures made before."""
     chosen = part_vertices(covering, part)
     distance = near.near(local[chosen], 0.0).distance.astype(np.float64)
     inside = distance < 0.0
@@ -145,7 +147,7 @@ def contacts(
     place: Places | None = None,
     tolerance: float = 5e-4,
 ) -> list[Contact]:
-    """Parts of a deformed surface (V, 3) that touch an object, nearer than ``tolerance`` [m]."""
+    """Parts of a deformed surface (V, 3) that are nearer to an object than ``tolerance`` [m]."""
     from warpjld.grasp.hand_object_gaps import HandObjectGaps
 
     where = thing.place if place is None else place
@@ -183,7 +185,7 @@ def _common_volume(
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     share = np.clip(0.5 - near.near(points, h).distance.astype(np.float64) / h, 0.0, 1.0)
     points, share = points[share > 0.0], share[share > 0.0]
-    part = len(chosen) < len(local)  # of a part: what is nearest to its skin
+    part = len(chosen) < len(local)  # the volume of a part: grid cells whose nearest triangle belongs to it
     to_skin, face = posed.distances(skin, points, np.inf if part else h)
     share = share * np.clip(0.5 - to_skin / h, 0.0, 1.0)
     if part:

@@ -1,4 +1,4 @@
-"""How good a closed hand's grasp is: what touches, how deep, whether it holds."""
+"""Judgement of closed hands: contacts that can press, force closure, epsilon quality, penetration."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
 from warpjld.errors import InputError
+from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.digits import digit_chains
-from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
-from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.quality.closure import force_closure
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.quality.touch import ContactPatches
 from warpjld.grasp.quality.wrench_space import least_resistance
 from warpjld.grasp.segments import SEGMENTS, vertex_segments
+from warpjld.grasp.subdivided_skin import FinerSkin
 from warpjld.grasp.touching import touching_patches
 from warpjld.skeleton import DIGITS, Poses
 
 __all__ = ["Judge", "Pressing", "Verdict", "check_friction", "hand_side", "judge"]
 
-_TOUCH = 5e-4  # skin this near touches [m]
-_NEARLY = 2.5e-3  # the same at a first look [m]
-_SPACING = 1.5e-3  # of the skin's points [m]
-_EDGES = 8  # of friction cones
-_DIGIT = 0.01  # what a digit more is worth, in epsilon [N]
+_TOUCH = 5e-4  # largest distance that counts as contact [m]
+_NEARLY = 2.5e-3  # the same when ranking hands that closed roughly [m]
+_SPACING = 1.5e-3  # spacing of the sample points on the skin [m]
+_EDGES = 8  # edges of the friction cones
+_DIGIT = 0.01  # bonus to the score for every digit in contact [N]
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Verdict:
     """Judgement of one closed hand.
 
     Attributes:
-        closed: Force closure by the contacts that can press.
-        epsilon: Ferrari–Canny epsilon of these [N], norm L1, torques over the object's largest radius.
+        closed: Whether the contacts that can press make the grasp force closed.
+        epsilon: Ferrari–Canny epsilon of these contacts [N], norm L1, torques divided by the object's largest radius.
         digits: Digits that press, thumb included, e.g. ``thumb``.
         palm: Whether the palm presses.
-        depth: Depth of hand and object in one another [m], see ``HandObjectGaps``.
+        depth: Penetration depth of hand and object [m], see ``HandObjectGaps``.
     """
 
     closed: bool
@@ -58,19 +58,19 @@ class Verdict:
 
     @property
     def score(self) -> float:
-        """epsilon + 0.01 N a digit where the grasp is force closed, else 0."""
+        """Score [N]: epsilon + 0.01 N per pressing digit where the grasp is force closed, else 0."""
         return self.epsilon + _DIGIT * len(self.digits) if self.closed else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Pressing:
-    """What presses of one hand.
+    """Contacts of one hand that can press on the object.
 
     Attributes:
-        contacts: In the object's frame.
+        contacts: The contacts in the object's frame.
         digits: Digits that press, without side.
         palm: Whether the palm presses.
-        depth: Of the skin's deepest point in the object [m].
+        depth: Depth of the skin's deepest point in the object [m].
     """
 
     contacts: Contacts
@@ -82,16 +82,16 @@ class Pressing:
 class Judge:
     """Judges hands that closed on an object.
 
-    Only contacts count with which a hand can press: those on the inner side of digits and palm, where a segment's skin
-    normal does not point to the back of the hand. A digit that merely leans on the object with its back holds nothing.
+    Only contacts on the palmar side of digits and palm count, where the contact's skin normal does not point to the
+    back of the hand: a hand cannot press with the back of a digit.
 
     Args:
-        both: Hand and object, which stands at its own place.
-        side: Which hand of the covering.
+        both: Distances between hand and object, which is at its own placement.
+        side: ``left`` or ``right``.
         friction: Coulomb coefficient.
 
     Attributes:
-        digits: Digits that the hand has, without side.
+        digits: Names of the hand's digits, without side.
     """
 
     def __init__(self, both: HandObjectGaps, side: str, friction: float) -> None:
@@ -112,7 +112,11 @@ class Judge:
         self._joints[-1] = palm
 
     def first_look(self, poses: Poses, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Rank hands that closed roughly; larger is better, shape (G,), 0 and below for what will hardly do."""
+        """Rank hands that closed roughly, shape (G,): larger is better, 0 and below means not promising.
+
+        −1 without two digits and either thumb or palm; else closure margin + 0.04 per digit + 0.1 if force closed
+        − 50 per metre of depth beyond 1 mm. The weights are chosen by hand.
+        """
         ranks = np.zeros(len(vertices))
         for g, (patches, depth) in enumerate(self._patches(self._skin, vertices, _NEARLY)):
             contacts, digits, palm = self._pressing(patches, poses.rotations[g])
@@ -128,31 +132,31 @@ class Judge:
         """Judge G hands.
 
         Args:
-            poses: Of the closed hands.
+            poses: The closed hands.
             vertices: Their deformed skins [m], shape (G, V, 3).
-            depths: Of hands and object in one another [m], see ``HandObjectGaps``, shape (G,).
+            depths: Penetration depths of hands and object [m], see ``HandObjectGaps``, shape (G,).
         """
         return [
-            self.verdict(one.contacts, one.digits, one.palm, max(float(depth), one.depth))
-            for one, depth in zip(self.pressing(poses, vertices), depths, strict=True)
+            self.verdict(hand.contacts, hand.digits, hand.palm, max(float(depth), hand.depth))
+            for hand, depth in zip(self.pressing(poses, vertices), depths, strict=True)
         ]
 
     def pressing(self, poses: Poses, vertices: NDArray[np.floating]) -> list[Pressing]:
-        """What presses of G closed hands, with skins (G, V, 3) [m]."""
+        """Contacts that can press, of G closed hands with skins (G, V, 3) [m]."""
         return [
             Pressing(*self._pressing(patches, poses.rotations[g]), depth)
             for g, (patches, depth) in enumerate(self._patches(self._finer, vertices, _TOUCH))
         ]
 
     def verdict(self, contacts: Contacts, digits: tuple[str, ...], palm: bool, depth: float) -> Verdict:
-        """Judgement of contacts in the object's frame; a ball about the origin in the wrench space is force closure."""
+        """Judge contacts in the object's frame; they are force closed where epsilon is above 0."""
         epsilon = least_resistance(contacts, self._center, torque_scale=self._radius, edges=_EDGES)
         return Verdict(epsilon > 0.0, epsilon, digits, palm, depth)
 
     def _patches(
         self, finer: FinerSkin, vertices: NDArray[np.floating], tolerance: float
     ) -> Iterable[tuple[ContactPatches, float]]:
-        """Patches of contact in the object's frame, and depth of the skin's points, of every hand."""
+        """Contact patches in the object's frame and depth of the skin's deepest point [m], for every hand."""
         place, parts = self.both.thing.place, self._segments[finer.parents]
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
         patches, depths = touching_patches(finer, parts, self.both.near, local, tolerance)
@@ -175,20 +179,20 @@ class Judge:
 def judge(
     covering: Covering, thing: GraspObject, poses: Poses, *, side: str | None = None, friction: float = 0.6
 ) -> list[Verdict]:
-    """How well closed hands hold an object: contacts that can press, force closure, depth.
+    """Judge how closed hands hold an object: contacts that can press, force closure, epsilon, penetration.
 
     Args:
         covering: The hand, smooth method.
-        thing: The object, where it stands.
-        poses: Closed hands, one a frame.
+        thing: The object at its own placement.
+        poses: Closed hands, one per frame.
         side: ``left`` or ``right``; may be left out for a single hand.
         friction: Coulomb coefficient.
 
     Returns:
-        One verdict a frame.
+        One verdict per frame.
 
     Raises:
-        InputError: No such hand, or no such coefficient.
+        InputError: No such hand, or a coefficient that is not positive.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -207,7 +211,7 @@ def judge(
 
 
 def hand_side(covering: Covering, side: str | None) -> str:
-    """Which hand of a covering is meant; the only one where none is named.
+    """Side of a hand of the covering: ``side`` if there is such a hand, or that of the only one if it is None.
 
     Raises:
         InputError: No such hand, or two of them.
@@ -220,10 +224,10 @@ def hand_side(covering: Covering, side: str | None) -> str:
 
 
 def check_friction(friction: float) -> None:
-    """Refuse what is no coefficient of friction.
+    """Check a coefficient of friction.
 
     Raises:
-        InputError: It is not.
+        InputError: It is not a finite number above 0.
     """
     if not (np.isfinite(friction) and friction > 0.0):
         raise InputError(f"friction: want a number above 0, got {friction:g}")

@@ -1,4 +1,4 @@
-"""Objects deformed by key frames: an animated surface from a file (R94)."""
+"""Objects with key-framed shapes: animated surfaces from files (R94)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class KeyframedShape:
     vertices: NDArray[np.float64]
 
     def at(self, frame: float) -> NDArray[np.float64]:
-        """Vertices at a frame: straight between two, the nearest outside."""
+        """Vertices at a frame [m], shape (n, 3): linear between key frames, constant outside."""
         after = int(np.clip(np.searchsorted(self.frames, frame), 1, max(1, len(self.frames) - 1)))
         if len(self.frames) == 1:
             return np.asarray(self.vertices[0])
@@ -43,14 +43,14 @@ class KeyframedShape:
 
 
 def load_keyframes(path: str | Path, *, name: str | None = None, scale: float = 1.0) -> KeyframedShape:
-    """Read an animated surface: an ``.npz`` as exports write it, or the first of numbered surface files.
+    """Read an animated surface: an ``.npz`` as the exports write it, or the first of numbered surface files.
 
-    ``bag.0010.obj`` is followed by ``bag.0011.obj`` and so on, as far as they go.
+    After ``bag.0010.obj``, ``bag.0011.obj`` and so on are read, up to the first number that is missing.
 
     Args:
         path: The file.
-        name: For messages; the file's stem if left out.
-        scale: Times larger.
+        name: Name for messages; the file's stem if left out.
+        scale: Factor on all coordinates.
 
     Raises:
         InputError: Unreadable, or shapes with different numbers of vertices.
@@ -64,7 +64,7 @@ def load_keyframes(path: str | Path, *, name: str | None = None, scale: float = 
         thing = make_object(name or path.stem, vertices[0], faces, origin=str(path))
     except InputError as error:
         raise InputError(error.message, path=path) from None
-    _, kept = cKDTree(vertices[0]).query(thing.vertices)  # welding leaves out vertices, but moves none
+    _, kept = cKDTree(vertices[0]).query(thing.vertices)  # welding removes vertices, but moves none
     return KeyframedShape(thing, frames, np.ascontiguousarray(vertices[:, kept]))
 
 

@@ -1,4 +1,4 @@
-"""Objects modelled as the papers say: profiles that turn or are swept, and soft objects of scalar fields (A3, B3.1).
+"""Modelled objects: surfaces of revolution, sweeps along paths, and soft objects (metaballs) (A3, B3.1).
 
 Examples:
     >>> from warpjld.grasp.modelled import revolved
@@ -20,25 +20,28 @@ from warpjld.grasp.objects import GraspObject, make_object
 __all__ = ["revolved", "soft", "swept"]
 
 _EDGE = 0.004
-"""Length of an edge of straight parts [m]."""
+"""Edge length on straight parts [m]."""
 _MOST = 64
-"""Pieces of a straight part at most."""
+"""Largest number of edges along a straight part."""
 _CELLS = 56
 """Cells of a soft object's grid along its longest side."""
 _SAME = 1e-9
-"""Points of a profile or a path that are nearer are one [m]."""
+"""Distance below which points of a profile or a path are the same [m]."""
 
 
 def revolved(profile: ArrayLike, *, segments: int = 96, name: str = "revolved") -> GraspObject:
-    """A profile turned about Y. One that begins or ends off the axis is closed by a disc; a closed one makes a ring.
+    """Surface of revolution about Y.
+
+    A profile that begins or ends off the axis is closed by a disc; a closed profile makes a ring.
 
     Args:
-        profile: Distances from the axis, 0 or more, and heights [m], shape (n, 2); first and last the same: closed.
-        segments: Around, 3 … 2048.
-        name: For messages.
+        profile: Distances from the axis, 0 or more, and heights [m], shape (n, 2). Closed if first and last point are
+            the same.
+        segments: Number of segments around the axis, 3 … 2048.
+        name: Name for messages.
 
     Raises:
-        InputError: A profile that encloses nothing, crosses itself, or goes beyond the axis.
+        InputError: A profile that encloses nothing, crosses itself, or crosses the axis.
     """
     points = _profile(profile, name)
     if not 3 <= segments <= 2048:
@@ -63,13 +66,13 @@ def revolved(profile: ArrayLike, *, segments: int = 96, name: str = "revolved") 
 
 
 def swept(profile: ArrayLike, path: ArrayLike, *, name: str = "swept") -> GraspObject:
-    """A closed outline swept along a path; its second axis stays as near to Y as the path lets it at its beginning.
+    """Sweep of a closed outline along a path; at the beginning the outline's second axis is as near to Y as possible.
 
     Args:
         profile: Corners of the outline [m], shape (n, 2), n ≥ 3.
-        path: Points it goes through, on a cubic spline where there are more than two [m], shape (m, 3), m ≥ 2; first
-            and last the same: closed.
-        name: For messages.
+        path: Points on the path [m], shape (m, 3), m ≥ 2, joined by a cubic spline where there are more than two.
+            Closed if first and last point are the same.
+        name: Name for messages.
 
     Raises:
         InputError: An outline that encloses nothing or crosses itself, or a path without length.
@@ -95,18 +98,18 @@ def swept(profile: ArrayLike, path: ArrayLike, *, name: str = "swept") -> GraspO
 
 
 def soft(centres: ArrayLike, radii: ArrayLike, *, name: str = "soft") -> GraspObject:
-    """A soft object: the surface Σ w(|x − c| / 2r) = ½ of a field around key points; one alone is a ball of radius r.
+    """Soft object: the level set Σ w(|x − c| / 2r) = ½ of a field around key points; a single one gives a ball.
 
     w(s) = 1 − 22/9 s² + 17/9 s⁴ − 4/9 s⁶ up to s = 1, nothing beyond (G. Wyvill, C. McPheeters, B. Wyvill 1986, Data
     structure for soft objects, The Visual Computer 2, 227–234); polygonised by VTK.
 
     Args:
         centres: Key points [m], shape (k, 3).
-        radii: [m], shape (k,).
-        name: For messages.
+        radii: Radius of the ball around each [m], shape (k,).
+        name: Name for messages.
 
     Raises:
-        InputError: Wrong shapes, or radii that are none.
+        InputError: Wrong shapes, or radii that are not positive.
     """
     import pyvista
 
@@ -130,7 +133,11 @@ def soft(centres: ArrayLike, radii: ArrayLike, *, name: str = "soft") -> GraspOb
 
 
 def _profile(profile: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Points of a profile, none of them twice in a row."""
+    """Points of a profile (n, 2) without consecutive duplicates.
+
+    Raises:
+        InputError: Wrong shape, not finite, or fewer than two different points.
+    """
     points = np.asarray(profile, np.float64)
     if points.ndim != 2 or points.shape[1:] != (2,) or not np.isfinite(points).all():
         raise InputError(f"{name}: a profile wants points of two finite numbers each, got {points.shape}")
@@ -141,10 +148,10 @@ def _profile(profile: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def _refuse_crossing(line: NDArray[np.float64], name: str) -> None:
-    """Refuse a line (n, 2) two of whose parts cross.
+    """Refuse a polyline (n, 2) that crosses itself.
 
     Raises:
-        InputError: Names them.
+        InputError: Names the two segments that cross.
     """
     a, b = line[:-1], line[1:]
 
@@ -153,15 +160,16 @@ def _refuse_crossing(line: NDArray[np.float64], name: str) -> None:
             (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
         )
 
-    one, two = (a[:, None], b[:, None]), (a[None], b[None])
-    crossing = (side(*one, two[0]) * side(*one, two[1]) < 0.0) & (side(*two, one[0]) * side(*two, one[1]) < 0.0)
+    row, column = (a[:, None], b[:, None]), (a[None], b[None])
+    crossing = side(*row, column[0]) * side(*row, column[1]) < 0.0
+    crossing &= side(*column, row[0]) * side(*column, row[1]) < 0.0
     if crossing.any():
         k, m = np.argwhere(crossing)[0]
         raise InputError(f"{name}: the profile crosses itself, between its points {k + 1} and {m + 1}")
 
 
 def _finer(line: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A line (n, d) with points between."""
+    """Subdivide a polyline (n, d) into edges of about ``_EDGE``."""
     rows = [line[:1]]
     for start, end in itertools.pairwise(line):
         pieces = int(np.clip(round(float(np.linalg.norm(end - start)) / _EDGE), 1, _MOST))
@@ -170,7 +178,7 @@ def _finer(line: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _path(path: ArrayLike, name: str) -> tuple[NDArray[np.float64], bool]:
-    """Points along a path, and whether it is closed; the last of a closed one is left out."""
+    """Points along a path (n, 3), and whether it is closed; a closed one does not repeat its first point."""
     from scipy.interpolate import CubicSpline
 
     points = np.asarray(path, np.float64)
@@ -191,8 +199,10 @@ def _path(path: ArrayLike, name: str) -> tuple[NDArray[np.float64], bool]:
 
 
 def _frames(line: NDArray[np.float64], closed: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Two directions across a path at its points, carried along without a twist; a closed one is twisted evenly to
-    meet its beginning."""
+    """Rotation-minimising frame along a path: two unit vectors normal to it at every point, each (n, 3).
+
+    The remaining twist of a closed path is distributed evenly.
+    """
     from scipy.spatial.transform import Rotation
 
     around = np.concatenate([line[-1:], line, line[:1]]) if closed else line
@@ -214,7 +224,7 @@ def _frames(line: NDArray[np.float64], closed: bool) -> tuple[NDArray[np.float64
 
 
 def _lid(outline: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Triangles over an outline (n, 2), which may be concave."""
+    """Triangulation of an outline (n, 2), which may be concave."""
     import pyvista
 
     flat = np.column_stack([outline, np.zeros(len(outline))])
@@ -223,22 +233,22 @@ def _lid(outline: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _grid_faces(number: NDArray[np.int64], closed: bool) -> NDArray[np.int64]:
-    """Triangles of rings of points, numbered (rings, around); none without an area."""
+    """Triangles between rings of points with indices (rings, around); degenerate ones are left out."""
     rings = np.concatenate([number, number[:1]]) if closed else number
     after = np.roll(rings, -1, axis=1)
     a, b, c, d = rings[:-1], after[:-1], after[1:], rings[1:]
     faces = np.concatenate([np.stack(abc, axis=-1).reshape(-1, 3) for abc in ((a, b, c), (a, c, d))])
-    some = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return faces[some]
+    proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return faces[proper]
 
 
 def _made(
     name: str, origin: str, points: NDArray[np.float64], faces: NDArray, lids: list[NDArray[np.int64]]
 ) -> GraspObject:
-    """An object whose triangles are seen from outside.
+    """Object from points and triangles, oriented outwards.
 
     Raises:
-        InputError: It encloses nothing.
+        InputError: It encloses no volume.
     """
     triangles = np.concatenate([np.asarray(faces, np.int64), *lids])
     if not len(triangles):

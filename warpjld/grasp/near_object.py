@@ -1,4 +1,4 @@
-"""Points near one object: exact signed distances where they matter, bounds from a grid everywhere else."""
+"""Signed distances near one object: exact within a limit, elsewhere only bounds from a grid."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from warpjld.grasp.objects import GraspObject
 
 __all__ = ["NearObject", "NearPoints"]
 
-_STEP = 4e-3  # between the grid's nodes [m]
-_AROUND = 2  # steps that the grid reaches beyond the object
-_MOST = 400_000  # nodes; a larger object has a coarser grid
+_STEP = 4e-3  # spacing of the grid [m]
+_AROUND = 2  # margin of the grid around the object's bounding box, in steps
+_MOST = 400_000  # largest number of grid nodes; a larger object has a coarser grid
 
 
 @dataclass(frozen=True, eq=False)
 class NearPoints:
-    """Points within a limit of an object, or in it.
+    """Closest points on an object, for points inside it or within a limit of it.
 
     Attributes:
         distance: Signed distance [m], +inf where it is surely beyond the limit, shape (n,).
-        face: Nearest triangle, -1 there, shape (n,).
-        point: Nearest points in the object's frame [m], shape (n, 3); only where there is a triangle.
+        face: Nearest triangle, -1 where the distance is infinite, shape (n,).
+        point: Nearest points in the object's frame [m], shape (n, 3); valid only where ``face`` is not -1.
     """
 
     distance: NDArray[np.float32]
@@ -34,13 +34,14 @@ class NearPoints:
 
 
 class NearObject:
-    """An object in its own frame, with a grid of signed distances that is filled where it is looked at.
+    """An object in its own frame, with a grid of signed distances that is filled lazily, node by node.
 
     Args:
-        thing: The object where it stands.
+        thing: The object at its own placement.
 
     Attributes:
-        objects: It alone, standing at the origin.
+        thing: As given.
+        objects: The object alone, placed at the origin.
     """
 
     def __init__(self, thing: GraspObject) -> None:
@@ -53,7 +54,7 @@ class NearObject:
         step = max(_STEP, float((np.prod(size + 4.0 * _STEP) / _MOST) ** (1.0 / 3.0)))
         count = np.ceil(size / step).astype(int) + 2 * _AROUND + 1 if thing.report.solid else np.zeros(3, dtype=int)
         grid = SignedGrid()
-        # float32 rounds the surface by less than this
+        # upper bound of the error from rounding the surface to float32
         slack = 1e-6 * float(np.abs(thing.vertices).max())
         grid.object, grid.step = 0, step
         grid.lowest, grid.highest = wp.vec3d(*(low - slack)), wp.vec3d(*(high + slack))
@@ -64,13 +65,13 @@ class NearObject:
     def least_by_part(
         self, points: Any, chosen: NDArray[np.int32], part_of: NDArray[np.int32], gaps: NDArray[np.float64]
     ) -> None:
-        """Bring ``gaps`` (P, parts) down to the smallest signed distances of each part's points to the object [m].
+        """Lower ``gaps`` (P, parts), in place, to the smallest signed distance of each part's points to the object [m].
 
         Args:
             points: ``wp.array`` of vec3, P or more poses in the object's frame.
-            chosen: Points that are looked at, shape (n,).
+            chosen: Indices of the points to measure, shape (n,).
             part_of: Part of each of them, shape (n,).
-            gaps: What is known already, contiguous.
+            gaps: Distances found so far, contiguous; only smaller ones are looked for.
         """
         import warp as wp
         from warpjld_kernels.signed_grid import least_by_part
@@ -88,7 +89,7 @@ class NearObject:
         wp.launch(least_by_part, len(gaps), inputs=[self.objects.solids, self.grid, points, *inputs], device="cpu")
 
     def least(self, skins: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Smallest signed distance of any vertex of skins (P, V, 3) on the stage to the object at its place, (P,)."""
+        """Smallest signed distance of skins (P, V, 3) in world space to the object at its own placement [m], (P,)."""
         import warp as wp
 
         count = skins.shape[1]
@@ -99,7 +100,7 @@ class NearObject:
         return gaps[:, 0]
 
     def at_least(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """What signed distances of points in the object's frame (…, 3) are at least by the grid [m], shape (…)."""
+        """Lower bounds, from the grid, of signed distances of points (…, 3) in the object's frame [m], shape (…)."""
         import warp as wp
         from warpjld_kernels.signed_grid import least_distances
 
@@ -111,7 +112,7 @@ class NearObject:
         return out
 
     def near(self, points: NDArray[np.floating], limit: float) -> NearPoints:
-        """Distances of points in the object's frame (n, 3) that may lie within a limit [m], or in the object."""
+        """Closest points for points (n, 3) in the object's frame that lie inside it or within a limit [m] of it."""
         import warp as wp
         from warpjld_kernels.signed_grid import measure_near
 

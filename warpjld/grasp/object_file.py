@@ -1,4 +1,4 @@
-"""Objects from files: whatever trimesh reads, in metres with Y up."""
+"""Loading of objects from surface files, converted to metres with Y up."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from warpjld.io.mesh_file import read_mesh
 __all__ = ["UNITS", "load_object"]
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+"""Metres per unit of a file."""
+
 _TURNS = {
     "y": np.eye(3),
     "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
@@ -34,14 +36,14 @@ def load_object(
 
     Args:
         path: Surface file: OBJ, STL, PLY, OFF, glTF, …
-        name: For messages; the file's stem if left out.
-        unit: Unit of the file's numbers, one of ``UNITS``.
+        name: Name for messages; the file's stem if left out.
+        unit: Unit of the file's coordinates, one of ``UNITS``.
         up: The file's axis that points up; it is turned to Y.
-        scale: Times larger.
-        centre: Put the origin at the centre of the bounding box instead of the file's own.
+        scale: Additional factor on all coordinates.
+        centre: Move the origin to the centre of the bounding box; else the file's origin is kept.
 
     Raises:
-        InputError: Unreadable, empty, not finite, not manifold, an unknown unit or axis.
+        InputError: Unreadable, empty, not finite, one-sided, or an unknown unit or axis.
 
     Examples:
         >>> from tempfile import mkdtemp

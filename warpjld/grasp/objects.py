@@ -1,4 +1,4 @@
-"""Objects to be grasped: a rigid surface in its own frame, and where it stands."""
+"""Rigid objects to be grasped: a triangulated surface in its own frame, and its placement in the world."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ __all__ = ["GraspObject", "Places", "make_object"]
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """P rigid placements: a point x of the object's frame lies at rotation · x + position.
+    """P rigid placements: a point x of the object's frame has the world position rotation · x + position.
 
     Attributes:
-        position: Where the object's origin lies [m], shape (P, 3).
+        position: World position of the object's origin [m], shape (P, 3).
         rotation: Unit quaternions x, y, z, w, shape (P, 4).
     """
 
@@ -32,10 +32,12 @@ class Places:
 
     @staticmethod
     def of(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Places:
-        """One or more placements; one position goes with many rotations and the other way round.
+        """One or more placements; a single position is combined with many rotations, and vice versa.
+
+        Rotations are normalised.
 
         Raises:
-            InputError: Wrong shapes, not finite, or a rotation without length.
+            InputError: Wrong shapes, not finite, or a zero quaternion.
         """
         at = np.atleast_2d(np.asarray(position, dtype=np.float64))
         turn = np.atleast_2d(np.asarray(rotation, dtype=np.float64))
@@ -56,13 +58,13 @@ class Places:
         return Places(np.atleast_2d(self.position[which]), np.atleast_2d(self.rotation[which]))
 
     def apply(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Points of the object's frame (n, 3) on the stage [m], shape (P, n, 3)."""
+        """World positions [m], shape (P, n, 3), of points (n, 3) in the object's frame."""
         turn = Rotation.from_quat(self.rotation).as_matrix()
         local = np.asarray(points, dtype=np.float64)
         return np.einsum("pij,nj->pni", turn, local) + self.position[:, None]
 
     def to_local(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Stage points (n, 3) in the object's frame [m], shape (P, n, 3)."""
+        """World points (n, 3) in the object's frame [m], shape (P, n, 3)."""
         turn = Rotation.from_quat(self.rotation).as_matrix()
         away = np.asarray(points, dtype=np.float64)[None] - self.position[:, None]
         return np.einsum("pji,pnj->pni", turn, away)
@@ -73,15 +75,15 @@ class GraspObject:
     """A rigid object.
 
     Attributes:
-        name: For messages.
+        name: Name for messages.
         vertices: Positions in the object's frame [m], shape (n, 3).
         faces: Triangles, anticlockwise seen from outside, shape (t, 3).
-        report: What was found on the surface when it came in.
-        place: Where it stands at first.
-        origin: File it comes from, or the built-in shape.
-        numbers: Number that every vertex has in the file, shape (n,); None where it is its row.
-        facets: Facet of the file, triangle or larger polygon, that every triangle is a part of, shape (t,); None where
-            it is its row. People count facets so (R133); functions that take a triangle say so.
+        report: Defects of the surface that were found and repaired when it was made.
+        place: Initial placement.
+        origin: File it comes from, or name of the built-in shape.
+        numbers: Index of every vertex in the file, shape (n,); None where it is the row.
+        facets: Facet of the file (triangle or larger polygon) that every triangle is a part of, shape (t,); None where
+            it is the row. Commands number facets as the file does (R133); functions that take a triangle say so.
 
     Examples:
         >>> ball = wj.shapes.ball(0.065).placed((0.0, -0.05, -0.06))
@@ -101,14 +103,14 @@ class GraspObject:
     facets: NDArray[np.int64] | None = None
 
     def facet_of(self, triangle: int) -> int:
-        """The file's number of the facet that a triangle is a part of."""
+        """Number, in the file, of the facet that a triangle is a part of."""
         return triangle if self.facets is None else int(self.facets[triangle])
 
     def triangles_of(self, facet: int) -> NDArray[np.int64]:
-        """Triangles that make up a facet of the file.
+        """Rows of the triangles that make up a facet of the file.
 
         Raises:
-            InputError: There is no such facet, or nothing is left of it.
+            InputError: There is no such facet, or its triangles were removed.
         """
         facets = np.arange(len(self.faces)) if self.facets is None else self.facets
         found = np.flatnonzero(facets == facet)
@@ -123,11 +125,11 @@ class GraspObject:
         return f"GraspObject('{self.name}': {len(self.faces)} facets, {x:.3g} × {y:.3g} × {z:.3g} m)"
 
     def placed(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> GraspObject:
-        """The same object standing elsewhere."""
+        """Copy with another initial placement: position [m] and unit quaternion x, y, z, w."""
         return replace(self, place=Places.of(position, rotation))
 
     def scaled(self, factor: float) -> GraspObject:
-        """The same object larger or smaller about its own origin.
+        """Copy scaled about its own origin.
 
         Raises:
             InputError: A factor that is not a positive number.
@@ -137,7 +139,11 @@ class GraspObject:
         return replace(self, vertices=self.vertices * factor)
 
     def check_facet(self, facet: int) -> int:
-        """The row of a triangle, or an InputError that says which there are."""
+        """The row of a triangle.
+
+        Raises:
+            InputError: There is no such row; states the valid range.
+        """
         if not 0 <= facet < len(self.faces):
             raise InputError(f"object {self.name} has facets 0 to {len(self.faces) - 1}, got {facet}")
         return int(facet)
@@ -149,16 +155,17 @@ class GraspObject:
 
     @cached_property
     def volume(self) -> float:
-        """Enclosed volume [m³]; holes are closed by flat fans."""
+        """Enclosed volume [m³]; holes are closed by triangle fans around their centres."""
         from warpjld.covering.quality import enclosed_volume
 
         return float(enclosed_volume(self.vertices, self.faces))
 
     @cached_property
     def centroid(self) -> NDArray[np.float64]:
-        """Centre of the enclosed volume [m], the centre of mass at even density, shape (3,).
+        """Centroid of the enclosed volume [m] (centre of mass at uniform density), shape (3,).
 
-        Σ V_t (a + b + c) / 4 over tetrahedra from the mean vertex; the bounding box's centre where there is no volume.
+        Σ V_t (a + b + c) / 4 over tetrahedra from the mean vertex; the bounding box's centre where the surface is open
+        or has no volume.
         """
         middle = self.vertices.mean(axis=0)
         a, b, c = (self.vertices[self.faces[:, k]] - middle for k in range(3))
@@ -182,18 +189,18 @@ def make_object(
     polygons: NDArray[np.int64] | None = None,
     origin: str = "",
 ) -> GraspObject:
-    """An object from arrays: welded, checked and mended (see ``report``).
+    """Make an object from arrays; vertices are welded, the surface is checked and repaired (see ``report``).
 
     Args:
-        name: For messages.
+        name: Name for messages.
         vertices: Positions [m], shape (n, 3).
         faces: Triangles, shape (t, 3).
-        parts: Ranges that are welded each by itself.
-        polygons: Polygon that each triangle is a part of, shape (t,), where there are larger ones.
-        origin: Where it comes from.
+        parts: Ranges of vertices and faces that are welded separately.
+        polygons: Polygon that each triangle is a part of, shape (t,), where the file has larger polygons.
+        origin: File or built-in shape it comes from.
 
     Raises:
-        InputError: Empty, not finite, wrong shapes, not manifold, or one-sided.
+        InputError: Empty, not finite, wrong shapes, or one-sided.
 
     Examples:
         >>> wj.make_object("wedge", [[0, 0, 0], [0.05, 0, 0], [0, 0.05, 0], [0, 0, 0.05]],
@@ -201,7 +208,7 @@ def make_object(
         GraspObject('wedge': 4 facets, 0.05 × 0.05 × 0.05 m)
     """
     try:
-        # pieces stay as they are: where three borders meet, one surface would not be manifold
+        # borders of separate pieces are not joined: where three of them meet, the edge would be non-manifold
         apart = np.zeros(len(np.asarray(vertices)), dtype=bool)
         surface = weld_surface(vertices, faces, parts=parts, polygons=polygons, joins=apart)
         mended = mend(surface.vertices, surface.faces)

@@ -1,4 +1,4 @@
-"""Objects beside the one that is grasped: no part of a hand is to enter them."""
+"""Obstacles: objects beside the one that is grasped, which no part of a hand may enter."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from warpjld.grasp.objects import GraspObject
 __all__ = ["COLLIDES", "Obstacles"]
 
 COLLIDES = 1e-4
-"""A hand that is deeper than this in an object has run into it [m]."""
+"""Penetration depth above which a hand collides with an object [m]."""
 
-_COARSE = 4  # at a first look every fourth vertex
+_COARSE = 4  # the fast test looks at every fourth vertex
 
 
 class Obstacles:
-    """What is in a hand's way; false where there is nothing.
+    """Collision tests of a hand with obstacles; false (``bool``) if there are none.
 
     Args:
         covering: The hand.
-        things: Objects where they stand.
+        things: The obstacles at their own placements.
     """
 
     def __init__(self, covering: Covering, things: Sequence[GraspObject]) -> None:
@@ -37,7 +37,7 @@ class Obstacles:
         return bool(self.names)
 
     def missed(self, skins: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """First look at deformed skins (S, V, 3) [m]: whether none of their vertices is in an obstacle, shape (S,)."""
+        """Fast test of deformed skins (S, V, 3) [m]: mask of those with no tested vertex in an obstacle, shape (S,)."""
         if self._objects is None or not len(skins):
             return np.ones(len(skins), dtype=bool)
         sets, which = (rows.ravel() for rows in np.indices((len(skins), len(self.names))))
@@ -46,7 +46,7 @@ class Obstacles:
         return np.asarray(nearest.min(axis=1) > -COLLIDES)
 
     def depth(self, skins: NDArray[np.floating]) -> float:
-        """Depth of the deepest point of hands and obstacles in one another [m], looked at from both sides, 0 for none.
+        """Largest penetration depth of any of the hands and any obstacle [m], measured in both directions; 0 for none.
 
         Args:
             skins: Deformed skins [m], shape (S, V, 3).

@@ -1,4 +1,4 @@
-"""How far apart thumb and fingers are while a hand closes in the air, and where: what fits between them."""
+"""Distance between thumb and finger pads while a hand closes in the air: the widths that fit between them."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["Opening", "closing_in_air"]
 
-_STEPS = 15
-_CURL = {"finger": (50.0, 45.0, 30.0), "thumb": (20.0, 40.0, 45.0)}  # of the joints at the end [degrees]
+_STEPS = 15  # poses from open to curled
+_CURL = {"finger": (50.0, 45.0, 30.0), "thumb": (20.0, 40.0, 45.0)}  # flexion added to the joints, base first [degrees]
 
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """A posture from open to curled, S steps; the root at rest.
+    """A closing motion in S steps from an open posture to curled digits, with the root at rest.
 
     Attributes:
         angles: Joint angles [rad], shape (S, J, 4).
         thumb: Middle of the thumb's pad [m], shape (S, 3).
-        fingers: Mean of the pads of index and middle finger, and of the ring finger where it closes, shape (S, 3).
+        fingers: Mean of the pads of index, middle and ring finger, of those that close [m], shape (S, 3).
     """
 
     angles: NDArray[np.float64]
@@ -35,12 +35,12 @@ class Opening:
 
     @property
     def width(self) -> NDArray[np.float64]:
-        """Between thumb and fingers [m], shape (S,)."""
+        """Distance between thumb and fingers [m], shape (S,)."""
         return np.asarray(np.linalg.norm(self.fingers - self.thumb, axis=1))
 
     @property
     def between(self) -> NDArray[np.float64]:
-        """Middles between thumb and fingers [m], shape (S, 3)."""
+        """Midpoints between thumb and fingers [m], shape (S, 3)."""
         return 0.5 * (self.thumb + self.fingers)
 
     def step_for(self, width: float) -> int:
@@ -50,13 +50,13 @@ class Opening:
 
 
 def closing_in_air(covering: Covering, side: str, starts: NDArray[np.float64], digits: Sequence[str]) -> list[Opening]:
-    """Curl digits from postures.
+    """Closing motions from open postures, one for each.
 
     Args:
         covering: The hand.
-        side: Which hand of it.
-        starts: Angles of open hands [rad], shape (N, J, 4).
-        digits: Names of those that close, without side.
+        side: ``left`` or ``right``.
+        starts: Angles of N open hands [rad], shape (N, J, 4).
+        digits: Names of the digits that close, without side.
     """
     skeleton = covering.skeleton
     angles = np.repeat(starts[:, None], _STEPS, axis=1)

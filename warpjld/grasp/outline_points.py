@@ -1,4 +1,4 @@
-"""Points that stand for an object's surface where it could cut into skin: its vertices, and its edges between them."""
+"""Sample points of an object for penetration tests: its vertices, and points along its sharp edges."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from warpjld.grasp.objects import GraspObject
 
 __all__ = ["outline_points"]
 
-_SHARP = np.cos(np.radians(10.0))
+_SHARP = np.cos(np.radians(10.0))  # cosine of the angle between face normals from which an edge is sharp
 
 
 def outline_points(thing: GraspObject, spacing: float = 2e-3) -> NDArray[np.float64]:
-    """The vertices, and points along sharp edges no farther than ``spacing`` [m] apart, in the object's frame, (n, 3).
+    """The vertices, and points along sharp edges at most ``spacing`` [m] apart, in the object's frame, shape (n, 3).
 
-    An edge is sharp where its faces' normals differ by 10° or more, or where it has one face only. Inside flat parts no
-    point is needed: what touches them are the other surface's vertices.
+    An edge is sharp where the normals of its faces differ by 10° or more, or where it does not have exactly two faces.
+    Flat regions need no further points: contact there is detected by the other surface's vertices.
     """
     first, place, uses = edges_of_sides(thing.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
     total = np.zeros((len(first), 3))

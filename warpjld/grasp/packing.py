@@ -1,4 +1,4 @@
-"""Coverings, poses and moving joints as the search kernels want them."""
+"""Conversion of coverings, poses and chains of joints to the structures of the search kernels."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ __all__ = ["Chains", "drives_on", "posture_on", "skin_on"]
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """R chains of joints that close together, each in some frame.
+    """R chains of joints that close together, each in one frame.
+
+    The closing c is a chain's only parameter: joint k has the flexion start + rate · c, up to its stop.
 
     Attributes:
-        frame: Shape (R,).
-        joints: From the root outwards, -1 where there are fewer than four, shape (R, 4).
-        rates: Turn of every joint for a closing of one [rad], negative where it extends, shape (R, 4).
-        stops: Angle at which each stays [rad], shape (R, 4).
-        starts: Angle at which each begins [rad], shape (R, 4).
+        frame: Frame of every chain, shape (R,).
+        joints: Joints from the root outwards, -1 where there are fewer than four, shape (R, 4).
+        rates: Flexion of every joint per unit of closing [rad], negative where it extends, shape (R, 4).
+        stops: Flexion at which each stops [rad], shape (R, 4).
+        starts: Flexion at which each begins [rad], shape (R, 4).
     """
 
     frame: NDArray[np.int32]
@@ -46,20 +48,21 @@ class Chains:
 
     @property
     def reach(self) -> NDArray[np.float64]:
-        """Closing at which the last joint has come to its stop, shape (R,)."""
+        """Closing at which the last joint reaches its stop, shape (R,)."""
         moving = (self.joints >= 0) & (self.rates != 0.0)
         span = (self.stops - self.starts) / np.where(moving, self.rates, 1.0)
         return np.asarray(np.where(moving, span, 0.0).max(axis=1, initial=0.0))
 
     def angles(self, closing: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle of every joint when its chain has closed by that much (R,) [rad], shape (R, 4)."""
+        """Flexion of every joint at a closing of its chain (R,) [rad], shape (R, 4)."""
         low, high = np.minimum(self.starts, self.stops), np.maximum(self.starts, self.stops)
         return np.asarray(np.clip(self.starts + self.rates * closing[:, None], low, high))
 
 
 def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
-    """``warpjld_kernels.closing_chain.Skin``: the operators of coverings of one skeleton and surface, one below the
-    other, so that vertex v of the c-th is row c · V + v.
+    """``warpjld_kernels.closing_chain.Skin``: operators of coverings of one skeleton and surface, concatenated.
+
+    Vertex v of covering c is row c · V + v.
 
     Raises:
         InputError: Coverings of different surfaces, or of another method than the smooth one.
@@ -100,7 +103,7 @@ def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
 
 
 def posture_on(device: Any, skeleton: Skeleton, poses: Poses, origin: NDArray[np.float64]) -> Any:
-    """``warpjld_kernels.closing_chain.Posture``, relative to a point of every frame, shape (F, 3)."""
+    """``warpjld_kernels.closing_chain.Posture``, positions relative to an origin for every frame [m], shape (F, 3)."""
     import warp as wp
     from warpjld_kernels.closing_chain import Posture
 
@@ -112,7 +115,18 @@ def posture_on(device: Any, skeleton: Skeleton, poses: Poses, origin: NDArray[np
 
 
 def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.float64], chains: Chains) -> Any:
-    """``warpjld_kernels.closing_chain.Drives``."""
+    """``warpjld_kernels.closing_chain.Drives``: axes, rates and limits of the joints that move, for every chain.
+
+    Args:
+        device: Warp device.
+        skeleton: Of J joints.
+        poses: F poses that the chains start from.
+        angles: Joint angles of these poses [rad], shape (F, J, 4).
+        chains: The joints that move.
+
+    Raises:
+        InputError: Joints of a chain that do not lie one beyond the other.
+    """
     import warp as wp
     from warpjld_kernels.closing_chain import Drives
 
@@ -162,7 +176,11 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
 
 
 def _depths(skeleton: Skeleton, joints: NDArray[np.int32]) -> NDArray[np.int32]:
-    """How many of a chain's joints lie at or above each joint of the skeleton, shape (R, J)."""
+    """Number of a chain's joints among each joint of the skeleton and its ancestors, shape (R, J).
+
+    Raises:
+        InputError: Joints of a chain that do not lie one beyond the other.
+    """
     unique, place = np.unique(joints, axis=0, return_inverse=True)
     out = np.zeros((len(unique), len(skeleton)), dtype=np.int32)
     for row, chain in zip(out, unique, strict=True):
@@ -177,11 +195,13 @@ def _depths(skeleton: Skeleton, joints: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _about(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions x, y, z, w of rotations about unit axes (…, 3) by angles (…) [rad]."""
     half = 0.5 * np.broadcast_to(angle, axis.shape[:-1])[..., None]
     return np.concatenate([np.sin(half) * axis, np.cos(half)], axis=-1)
 
 
 def _turn(q: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors (…, 3) rotated by quaternions (…, 4)."""
     return Rotation.from_quat(_flat(q)).apply(v.reshape(-1, 3)).reshape(v.shape)
 
 

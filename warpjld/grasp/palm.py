@@ -1,4 +1,4 @@
-"""The palm of a hand: where it is, where it looks, and how to turn it."""
+"""Frame of a hand's palm at rest: centre, normal and direction of the fingers."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from warpjld.skeleton import Skeleton
 
 __all__ = ["Palm", "palm_of"]
 
-_TOWARDS_KNUCKLE = 0.75
-_BESIDE = 0.15  # of the metacarpal's length: skin that near its line lies over the palm's middle
+_TOWARDS_KNUCKLE = 0.75  # place of the palm's centre along the middle metacarpal, from the wrist
+_BESIDE = 0.15  # radius, relative to the metacarpal's length, of the skin that is averaged at the palm's centre
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +22,10 @@ class Palm:
     """A hand's palm at rest.
 
     Attributes:
-        middle: Three quarters along the middle finger's metacarpal, or on the skin there [m], shape (3,).
-        normal: Unit direction out of the palm, where it looks, shape (3,).
-        fingers: Unit direction towards the fingers, normal to it, shape (3,).
-        length: Of the metacarpal [m].
+        middle: Palm centre, three quarters along the middle finger's metacarpal, or on the skin there [m], shape (3,).
+        normal: Unit normal out of the palm, shape (3,).
+        fingers: Unit direction towards the fingers, perpendicular to the normal, shape (3,).
+        length: Length of the metacarpal [m].
     """
 
     middle: NDArray[np.float64]
@@ -34,7 +34,10 @@ class Palm:
     length: float
 
     def on_skin(self, vertices: NDArray[np.floating]) -> Palm:
-        """The same with its middle moved out to the hand's skin at rest [m], shape (V, 3).
+        """Copy with its centre moved along the normal to the hand's skin.
+
+        Args:
+            vertices: The skin at rest [m], shape (V, 3).
 
         Raises:
             InputError: There is no skin on that side.
@@ -42,21 +45,21 @@ class Palm:
         away = vertices - self.middle
         height = away @ self.normal
         beside = np.linalg.norm(away - height[:, None] * self.normal, axis=1)
-        # no farther than the hand is thick: beyond a body's palm lies its thigh
+        # limited height: in a body's rest pose the thigh may lie beyond the palm
         near = (beside < _BESIDE * self.length) & (height > 0.0) & (height < self.length)
         if not near.any():
             raise InputError("hand: found no skin on the palm's side of the middle metacarpal")
         return replace(self, middle=self.middle + float(height[near].mean()) * self.normal)
 
     def turned_to(self, normal: NDArray[np.float64], fingers: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rotations after which the palm looks along ``normal`` and its fingers point along ``fingers``.
+        """Rotations that turn the palm's normal to ``normal`` and its fingers to ``fingers``.
 
         Args:
             normal: Unit directions, shape (…, 3).
-            fingers: Unit directions normal to those, shape (…, 3).
+            fingers: Unit directions perpendicular to those, shape (…, 3).
 
         Returns:
-            Matrices, shape (…, 3, 3).
+            Rotation matrices, shape (…, 3, 3).
         """
         own = np.stack([self.normal, self.fingers, np.cross(self.normal, self.fingers)])
         wanted = np.stack([normal, fingers, np.cross(normal, fingers)], axis=-2)
@@ -64,7 +67,7 @@ class Palm:
 
 
 def palm_of(skeleton: Skeleton, side: str | None = None) -> Palm:
-    """The palm of a skeleton's hand, of the only one if ``side`` is not given.
+    """The palm of a skeleton's hand; of the only hand if ``side`` is not given.
 
     Raises:
         InputError: There is no such hand, it has no middle finger, or there are two.

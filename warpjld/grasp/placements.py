@@ -1,4 +1,4 @@
-"""Placements of an open hand around an object: palm first, or thumb and fingers across a part that fits."""
+"""Placements of an open hand at an object: palm first, or thumb and fingers across a part that fits between them."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
 __all__ = ["Candidates", "across_widths", "around", "palms_on", "sample_wrists"]
 
-_CLEARANCE = 3e-4  # between the open hand and the object [m]
-_SPARE = 0.02  # by which a hand opens wider than what it takes [m]
-_STEPS = 32
-_NEXT = 1e-5  # a step shorter than this is none [m]
+_CLEARANCE = 3e-4  # distance at which the approach of the open hand stops [m]
+_SPARE = 0.02  # by how much the hand opens wider than the part it takes [m]
+_STEPS = 32  # largest number of steps of an approach
+_NEXT = 1e-5  # the approach ends when a step gets shorter than this [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Candidates:
     Attributes:
         position: Displacement of the skeleton's root [m], shape (G, 3).
         rotation: Rotation of the root about its rest place, x y z w, shape (G, 4).
-        approach: Direction in which the hand came, shape (G, 3).
+        approach: Unit direction in which the hand moves to its placement, shape (G, 3).
         angles: Joint angles [rad], shape (G, J, 4).
     """
 
@@ -47,7 +47,7 @@ class Candidates:
         return Candidates(self.position[rows], self.rotation[rows], self.approach[rows], self.angles[rows])
 
     def poses(self, skeleton: Skeleton, angles: NDArray[np.float64] | None = None) -> Poses:
-        """The hands, open or with other angles (G, J, 4)."""
+        """Poses of the hands, with their open angles or with others (G, J, 4) [rad]."""
         return poses_from_angles(
             skeleton,
             self.angles if angles is None else angles,
@@ -56,14 +56,14 @@ class Candidates:
         )
 
     def moved(self, by: NDArray[np.float64]) -> Candidates:
-        """The same farther along their approach by lengths [m], shape (G,)."""
+        """Copy moved forward along the approach by lengths (G,) [m]."""
         return Candidates(self.position + self.approach * by[:, None], self.rotation, self.approach, self.angles)
 
     @staticmethod
-    def joined(some: list[Candidates]) -> Candidates:
-        """One after another."""
+    def joined(batches: list[Candidates]) -> Candidates:
+        """Concatenation of several batches."""
         names = ("position", "rotation", "approach", "angles")
-        return Candidates(*(np.concatenate([getattr(one, name) for one in some]) for name in names))
+        return Candidates(*(np.concatenate([getattr(batch, name) for batch in batches]) for name in names))
 
 
 def sample_wrists(
@@ -78,10 +78,19 @@ def sample_wrists(
 ) -> Candidates:
     """Placements of an open hand with its palm on the object.
 
-    The palm looks against a direction out of the object's centre, evenly spread over the sphere; the fingers point
-    anywhere about it; the palm's middle is aimed at the centre, off by up to a fifth of the object's size. The hand
-    then comes as near as it can without touching: its skin's distance bounds each step. With ``ahead`` [m] the object
-    is met up to that far before the palm's middle towards the fingers, and the palm stays as far away from it.
+    The palms face the object's centre from directions distributed evenly over the sphere, with a random roll of the
+    fingers; the palm's centre is aimed at the object's centre, displaced by up to a fifth of the object's size. The
+    hand then approaches until its skin is next to the object; the skin's distance bounds each step.
+
+    Args:
+        covering: The hand.
+        angles: Joint angles of the open hand [rad], shape (J, 4).
+        near: The object.
+        side: ``left`` or ``right``.
+        count: Number of placements.
+        rng: Source of random numbers.
+        ahead: Largest distance in front of the palm's centre, towards the fingers, at which the object is met, and
+            that the palm stays away from it [m]; drawn at random for every placement.
     """
     palm, thing = palm_of(covering.skeleton, side), near.thing
     part = rng.uniform(0.0, 1.0, size=(count, 1)) if ahead else np.zeros((count, 1))
@@ -103,7 +112,7 @@ def sample_wrists(
         np.repeat(angles[None], count, axis=0),
     )
     back = np.full(count, float(np.linalg.norm(thing.size)) + 0.1)
-    beside = _come(covering, there.moved(-back), near, 2.0 * back)
+    beside = _approach(covering, there.moved(-back), near, 2.0 * back)
     return beside.moved(-ahead * part[:, 0])
 
 
@@ -120,28 +129,28 @@ def across_widths(
 ) -> Candidates:
     """Placements with the thumb at one end of a width and the fingers at the other, one for each width.
 
-    The hand opens so far that the width fits with 2 cm to spare and comes at right angles to it. At first the pads are
-    to meet the ends: a precision grip. From there it goes on for a random part of the way on which the palm would reach
-    the width, as far as it does not touch: towards a power grip.
+    The hand opens 2 cm wider than the width and approaches at right angles to it. A placement at which the pads meet
+    the ends would be a precision grip; from there the hand moves on by a random fraction of the distance to the palm,
+    as far as it does not touch, towards a power grip.
 
     Args:
         covering: The hand.
-        openings: Postures; every width takes one of them.
+        openings: Closing motions; one is chosen at random for every width.
         near: The object.
-        widths: N of them.
-        ways: Directions in which the hands come, at right angles to the widths, shape (N, 3).
-        side: Which hand.
-        rng: Source of randomness.
-        into: Largest part of the way to the palm.
+        widths: N widths of the object.
+        ways: Directions of approach, at right angles to the widths, shape (N, 3).
+        side: ``left`` or ``right``.
+        rng: Source of random numbers.
+        into: Largest fraction of the distance from the pads to the palm that the hand moves on.
     """
     count, skeleton = len(widths), covering.skeleton
     middle = palm_of(skeleton, side).middle
     chosen = rng.integers(len(openings), size=count)
     rows = [openings[k] for k in chosen]
-    fit = [one.step_for(width) for one, width in zip(rows, widths.width, strict=True)]
-    loose = [one.step_for(width + _SPARE) for one, width in zip(rows, widths.width, strict=True)]
-    thumb = np.stack([one.thumb[k] for one, k in zip(rows, fit, strict=True)])
-    fingers = np.stack([one.fingers[k] for one, k in zip(rows, fit, strict=True)])
+    fit = [opening.step_for(width) for opening, width in zip(rows, widths.width, strict=True)]
+    loose = [opening.step_for(width + _SPARE) for opening, width in zip(rows, widths.width, strict=True)]
+    thumb = np.stack([opening.thumb[k] for opening, k in zip(rows, fit, strict=True)])
+    fingers = np.stack([opening.fingers[k] for opening, k in zip(rows, fit, strict=True)])
     between = 0.5 * (thumb + fingers)
     own = _frame(fingers - thumb, between - middle)
     line = unit(widths.second - widths.first)
@@ -149,11 +158,11 @@ def across_widths(
     rotation = Rotation.from_matrix(np.einsum("gki,gkj->gij", wanted, own))
     root = skeleton.rest[0]
     position = 0.5 * (widths.first + widths.second) - (root + rotation.apply(between - root))
-    angles = np.stack([one.angles[k] for one, k in zip(rows, loose, strict=True)])
+    angles = np.stack([opening.angles[k] for opening, k in zip(rows, loose, strict=True)])
     there = Candidates(position, rotation.as_quat(), wanted[:, 1], angles)
     deeper = ((between - middle) * own[:, 1]).sum(axis=1) * rng.uniform(0.0, into, size=count)
     back = np.full(count, float(np.linalg.norm(near.thing.size)) + 0.15)
-    return _come(covering, there.moved(-back), near, back + deeper)
+    return _approach(covering, there.moved(-back), near, back + deeper)
 
 
 def palms_on(
@@ -165,16 +174,16 @@ def palms_on(
     look: NDArray[np.float64],
     fingers: NDArray[np.float64],
 ) -> Candidates:
-    """Placements of an open hand with its palm's middle at points of the object, as near as it comes.
+    """Placements of an open hand with its palm's centre aimed at points, moved up to the object.
 
     Args:
         covering: The hand.
-        angles: Of the open hand [rad], shape (J, 4).
+        angles: Joint angles of the open hand [rad], shape (J, 4).
         near: The object.
-        side: Which hand.
-        aim: Points [m], shape (G, 3).
-        look: Unit directions in which the palms look and the hands come, shape (G, 3).
-        fingers: Unit directions in which the fingers point, normal to those, shape (G, 3).
+        side: ``left`` or ``right``.
+        aim: World points [m], shape (G, 3).
+        look: Unit directions of the palm normals, which are the directions of approach, shape (G, 3).
+        fingers: Unit directions of the fingers, perpendicular to those, shape (G, 3).
     """
     palm, count = palm_of(covering.skeleton, side), len(aim)
     rotation = Rotation.from_matrix(palm.turned_to(look, fingers))
@@ -182,11 +191,11 @@ def palms_on(
     position = aim - (root + rotation.apply(palm.middle - root))
     there = Candidates(position, rotation.as_quat(), look, np.repeat(angles[None], count, axis=0))
     back = np.full(count, float(np.linalg.norm(near.thing.size)) + 0.1)
-    return _come(covering, there.moved(-back), near, 2.0 * back)
+    return _approach(covering, there.moved(-back), near, 2.0 * back)
 
 
-def _come(covering: Covering, hands: Candidates, near: NearObject, reach: NDArray[np.float64]) -> Candidates:
-    """Move hands along their approach, as far as ``reach`` (G,) or until their skin is next to the object."""
+def _approach(covering: Covering, hands: Candidates, near: NearObject, reach: NDArray[np.float64]) -> Candidates:
+    """Move hands forward by up to ``reach`` (G,) [m], or until their skin is within ``_CLEARANCE`` of the object."""
     import warp as wp
     from warpjld_kernels.lines_to_object import come_near
 
@@ -200,21 +209,21 @@ def _come(covering: Covering, hands: Candidates, near: NearObject, reach: NDArra
     ]
     settings = [_CLEARANCE, _NEXT, _STEPS]
     rest = [(scratch[0], float), (scratch[1], float), (moved, wp.float64)]
-    held, out = ([wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in some] for some in (arrays, rest))
+    held, out = ([wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in group] for group in (arrays, rest))
     objects = [near.objects.solids, near.grid, wp.vec3d(*place.position[0]), wp.quatd(*place.rotation[0])]
     wp.launch(come_near, len(hands), inputs=[*objects, *held, *settings, *out], device="cpu")
     return hands.moved(moved)
 
 
 def around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """Unit vectors normal to others (G, 3), the angle about them even."""
+    """Random unit vectors perpendicular to axes (G, 3), uniform in the angle about each, shape (G, 3)."""
     aside = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)]))
     roll = rng.uniform(0.0, 2.0 * np.pi, size=(len(axis), 1))
     return np.asarray(np.cos(roll) * aside + np.sin(roll) * np.cross(axis, aside))
 
 
 def _frame(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Right-handed frames as rows: along the first vectors, along the second as far as square to them, (G, 3, 3)."""
+    """Right-handed orthonormal frames by Gram–Schmidt, as rows, shape (G, 3, 3)."""
     x = unit(first)
     y = unit(second - x * (x * second).sum(axis=1, keepdims=True))
     return np.stack([x, y, np.cross(x, y)], axis=1)

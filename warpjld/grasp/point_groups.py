@@ -1,4 +1,4 @@
-"""Points in groups of groups, so that kernels pass over those that are all far from a surface, or all on one side."""
+"""Bounding-sphere hierarchy over points, so that kernels can skip groups that are far from a surface."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from warpjld.grasp.triangle_tree import halved
 
 __all__ = ["grouped_points"]
 
-_TOGETHER = 8  # points of the smallest groups
-_HELD = 4  # groups that one holds
-_WIDER = 1.0 + 1e-12  # radii are rounded
+_TOGETHER = 8  # points per leaf
+_HELD = 4  # children per group
+_WIDER = 1.0 + 1e-12  # factor on the radii against rounding
 
 
 def grouped_points(points: ArrayLike) -> Any:
-    """``warpjld_kernels.points_in_skins.PointGroups`` of points (n, 3), n > 0; they come in another order."""
+    """``warpjld_kernels.points_in_skins.PointGroups`` of points (n, 3), n > 0; the points are reordered."""
     import warp as wp
     from warpjld_kernels.points_in_skins import PointGroups
 
@@ -27,7 +27,7 @@ def grouped_points(points: ArrayLike) -> Any:
     while len(firsts[-1]) > 1:
         firsts.append(firsts[-1][::_HELD])
     ends = [np.append(first[1:], len(rows)) for first in firsts]
-    # a group before those it holds: by its first point, the larger first
+    # depth-first order, parents before children: by first point, larger groups first
     level = np.repeat(np.arange(len(firsts)), [len(first) for first in firsts])
     order = np.lexsort([-level, np.concatenate(firsts)])
     first, end = np.concatenate(firsts)[order], np.concatenate(ends)[order]
@@ -46,7 +46,7 @@ def grouped_points(points: ArrayLike) -> Any:
 def _middles(
     points: NDArray[np.float64], first: NDArray[np.int64], end: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Middles of the boxes of groups that follow one another (k, 3), and how far their points are from them (k,)."""
+    """Bounding spheres of k consecutive ranges of points: centres of their boxes (k, 3), and radii (k,)."""
     centre = 0.5 * (np.minimum.reduceat(points, first) + np.maximum.reduceat(points, first))
     away = np.linalg.norm(points - np.repeat(centre, end - first, axis=0), axis=1)
     return centre, _WIDER * np.maximum.reduceat(away, first)

@@ -1,4 +1,4 @@
-"""Many poses of one skin at once: how deep points are in each, and which of its parts pass through one another."""
+"""Batched queries on many poses of one skin: signed distances of points, and crossings between its parts."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from warpjld.grasp.triangle_tree import build_tree
 
 __all__ = ["PosedSkins"]
 
-_WIDTH = 8
-_MARGIN = 4e-7  # of the largest coordinate, by which boxes are wider than what they hold
-_MEMORY = 64_000_000  # bytes that the poses of a block may take
-_MOST_PARTS = 64
+_WIDTH = 8  # children of a node of the tree
+_MARGIN = 4e-7  # margin of the boxes relative to the largest coordinate, against float32 rounding
+_MEMORY = 64_000_000  # memory for the poses of one block [bytes]
+_MOST_PARTS = 64  # bits of the masks of parts
 
 
 class PosedSkins:
-    """The skin of a covering, ready to be posed.
+    """Bounding-volume tree over the skin of a covering, refitted to any pose.
 
-    Its tree is built once, at rest, and fitted to every pose: skin that is near by at rest stays so. Holes, such as a
-    hand's wrist, are closed by flat fans, and a point is inside that the skin winds round: folds, and pieces that
-    overlap, do not matter.
+    The tree is built once at rest and refitted for every pose; it stays efficient because triangles that are close at
+    rest remain close. Holes, such as at a hand's wrist, are closed by triangle fans. A point is inside where the
+    winding number says so, so folds and overlapping pieces are no problem.
 
     Args:
         covering: The hand or body.
 
     Attributes:
         parts: Parts of the skin, see ``surface_parts``.
-        most: Poses that are taken together at most, which bounds memory.
+        most: Largest number of poses per batch, which bounds memory.
     """
 
     def __init__(self, covering: Covering) -> None:
@@ -61,7 +61,10 @@ class PosedSkins:
         self._blocks: dict[int, Any] = {}
 
     def fitted(self, vertices: NDArray[np.floating], places: Places) -> Any:
-        """``warpjld_kernels.posed_skin.PosedSkins`` of up to ``most`` deformed skins (P, V, 3) in frames (P,)."""
+        """``warpjld_kernels.posed_skin.PosedSkins`` of up to ``most`` deformed skins (P, V, 3) [m].
+
+        Their coordinates are converted to the frames ``places`` (P of them).
+        """
         import warp as wp
         from warpjld_kernels.posed_skin import fit_trees
 
@@ -85,16 +88,16 @@ class PosedSkins:
         limit: float,
         outside: bool,
     ) -> None:
-        """Bring ``gaps`` (P, parts) down to the smallest signed distances of points to P fitted skins [m].
+        """Lower ``gaps`` (P, parts), in place, to the smallest signed distances of points to P fitted skins [m].
 
         Args:
             skins: From ``fitted``.
             points: ``warpjld_kernels.points_in_skins.PointGroups`` in the frames of the skins, see ``grouped_points``.
             part_of_face: Part that each triangle of the surface counts as, shape (T,).
-            gaps: What is known already, contiguous.
-            near: Points farther from a skin's bounding box do not count [m].
-            limit: Nor do distances beyond it [m].
-            outside: Whether points outside count.
+            gaps: Distances found so far, contiguous.
+            near: Points farther than this from a skin's bounding box are ignored [m].
+            limit: Distances whose magnitude exceeds this are ignored [m].
+            outside: Whether points outside the skin count.
         """
         import warp as wp
         from warpjld_kernels.points_in_skins import points_in_skins
@@ -121,10 +124,11 @@ class PosedSkins:
     def distances(
         self, skins: Any, points: NDArray[np.floating], limit: float
     ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        """Signed distances of points (n, 3) to the first of fitted skins [m], infinite beyond the limit, shape (n,).
+        """Signed distances of points (n, 3) to the first of the fitted skins.
 
         Returns:
-            Distances, and the nearest triangles: -1 beyond the limit, T and more in the fans that close holes.
+            Distances [m], infinite beyond the limit, and nearest triangles, -1 beyond the limit and T or more in the
+            fans that close holes, both shape (n,).
         """
         import warp as wp
         from warpjld_kernels.posed_skin import distances_to_skin
@@ -138,14 +142,15 @@ class PosedSkins:
         return distance, face
 
     def crossings(self, vertices: NDArray[np.floating], part: NDArray[np.int32] | None = None) -> NDArray[np.int64]:
-        """Pairs of triangles of different parts that pass through one another.
+        """Number of pairs of intersecting triangles that belong to different parts.
 
         Args:
             vertices: Deformed skins [m], shape (P, V, 3).
-            part: Part of each whose pairs are counted, shape (P,); all if left out.
+            part: For each skin the one part whose crossings are counted, shape (P,); all parts if left out.
 
         Returns:
-            By both parts, shape (P, parts, parts), symmetric; or of the asked parts with the others, (P, parts).
+            Counts by pair of parts, shape (P, parts, parts), symmetric; or of the chosen part with every other,
+            shape (P, parts).
         """
         found = [
             self._crossings(vertices[k : k + self.most], None if part is None else part[k : k + self.most])
@@ -180,7 +185,7 @@ class PosedSkins:
         return np.asarray(square + square.transpose(0, 2, 1))
 
     def _room(self, count: int) -> Any:
-        """Arrays for so many poses; those of a smaller batch are the first of a larger one's."""
+        """Arrays for at least ``count`` poses; smaller batches reuse the arrays of the largest one so far."""
         size = 1 << max(0, count - 1).bit_length()
         if size not in self._blocks:
             self._blocks = {size: self._new(size)} if size > max(self._blocks, default=0) else self._blocks
@@ -223,13 +228,13 @@ def _on_cpu(values: NDArray, kind: Any) -> Any:
 
 
 def _contents(tree: Any, part: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.uint64]]:
-    """Children of every node, shape (n,), and bits of the parts below each of them, shape (n, 8)."""
+    """Number of children of every node, shape (n,), and bit masks of the parts below each child, shape (n, 8)."""
     bits = np.where(part < 0, np.uint64(0), np.uint64(1) << (np.clip(part, 0, _MOST_PARTS - 1).astype(np.uint64)))
     of_leaf = np.bitwise_or.reduce(bits[tree.face], axis=1)
     held = np.zeros(len(tree.child), dtype=np.int32)
     inside = np.zeros((len(tree.child), _WIDTH), dtype=np.uint64)
     first_of_level, end = [0], 0
-    while end < len(tree.child) and tree.child[end] >= 0:  # nodes of a level lie one after another, the top one first
+    while end < len(tree.child) and tree.child[end] >= 0:  # nodes are stored level by level, the root first
         end = int(tree.child[end])
         first_of_level.append(end)
     ends = [*first_of_level[1:], len(tree.child)]

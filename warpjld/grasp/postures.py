@@ -1,4 +1,4 @@
-"""Open hands to begin a grasp with: a plate is not held as a glass (A §10, R90)."""
+"""Open hand postures that grasps start from, chosen by the object's proportions (A §10, R90)."""
 
 from __future__ import annotations
 
@@ -46,19 +46,19 @@ POSTURES: dict[str, dict[str, dict[str, float]]] = {
         "pinky.base": {"abduction": -10, "flexion": 25},
     },
 }
-"""Angles [degrees] of joints by posture; what is not named is straight."""
+"""Joint angles [degrees] by posture, joint and channel, chosen by hand; joints not named keep their initial angles."""
 
 
 CLOSING: dict[str, tuple[str, ...]] = {"pinch": ("middle", "index", "thumb")}
-"""Digits that close in a posture, where not all do."""
+"""Digits that close in a posture, for postures in which not all do."""
 
 
 AHEAD: dict[str, float] = {"pinch": 0.05}
-"""How far before the palm's middle an object is met [m], where it is not the palm that meets it."""
+"""Largest distance in front of the palm's centre at which a hand meets the object [m]; 0 where not named."""
 
 
 def posture_for(size: NDArray[np.float64]) -> str:
-    """The posture for an object's extents [m], shape (3,).
+    """Name of the posture for an object with these extents [m], shape (3,).
 
     With sides a ≤ b ≤ c: ``plate`` where a is thinner than a third of b and than 3 cm, ``pinch`` where c is shorter
     than 5 cm, ``cylinder`` where c is longer than 1.6 b, else ``sphere``.
@@ -72,7 +72,7 @@ def posture_for(size: NDArray[np.float64]) -> str:
 
 
 def posture_angles(skeleton: Skeleton, side: str, posture: str) -> NDArray[np.float64]:
-    """Angles [rad] of a posture, held at the joints' limits, shape (J, 4).
+    """Joint angles of a posture [rad], clamped to the joints' limits, shape (J, 4).
 
     Raises:
         InputError: There is no such posture.

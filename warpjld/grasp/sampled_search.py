@@ -1,7 +1,7 @@
-"""Flexion searches by samples, for coverings that no search kernel maps: the paper's own operators (A §7.3, R76).
+"""Flexion search by sampling, for coverings without a search kernel: the paper's own operators (A §7.3, R76).
 
-The same search as the kernel's: the first change of sign on the chain's way, else the closest approach. Samples of a
-span are mapped in one batch, and the span that holds the change of sign is divided by as many again.
+Finds what the kernel finds: the first change of sign of the distance along the chain's motion, else the closest
+approach. An interval is sampled in one batch, and the subinterval with the change of sign is sampled again.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.facet import facet_distance
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import Chains
-from warpjld.grasp.search_result import Found, SearchStatus
+from warpjld.grasp.search_result import SearchResult, SearchStatus
 from warpjld.grasp.searches import SearchRows
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["is_sampled", "sampled_search"]
 
-_STEPS = 64  # of the whole way
-_PARTS = 16  # of a span that is narrowed
-_NARROWEST = 1e-7  # closing; float32 places vertices no better
-_CLOSEST = 1e-5  # closing to which the closest approach is refined
+_STEPS = 64  # samples of the whole motion
+_PARTS = 16  # samples of an interval that is refined
+_NARROWEST = 1e-7  # smallest interval of closing [rad at rate 1]; float32 vertex positions resolve no less
+_CLOSEST = 1e-5  # interval of closing to which the closest approach is refined [rad at rate 1]
 
 
 def is_sampled(coverings: Sequence[Covering]) -> bool:
-    """Whether these coverings are searched here.
+    """Whether these coverings (of the paper's method) need the search by sampling.
 
     Raises:
         InputError: Coverings of different methods, surfaces or skeletons.
@@ -56,14 +56,14 @@ def sampled_search(
     rows: SearchRows,
     places: Places,
     tolerance: float,
-) -> Found:
-    """What ``FlexionSearch.run`` finds, search after search; arguments as there."""
+) -> SearchResult:
+    """Results of searches, computed one after another; arguments as for ``FlexionSearch.run``."""
     ended = [
         _Search(coverings[rows.covering[k]], objects, poses, angles, rows, places, k).run(tolerance)
         for k in range(len(rows))
     ]
     closing = np.array([end.closing for end in ended], dtype=np.float32)
-    return Found(
+    return SearchResult(
         status=np.array([end.status for end in ended], dtype=np.int32),
         closing=closing,
         angles=rows.chains[rows.drive].angles(closing.astype(np.float64)),
@@ -77,6 +77,8 @@ def sampled_search(
 
 @dataclass(frozen=True, eq=False)
 class _End:
+    """Result of one search."""
+
     status: SearchStatus
     closing: float
     distance: float
@@ -86,7 +88,7 @@ class _End:
 
 
 class _Search:
-    """One row of searches."""
+    """One search: a row of ``SearchRows``."""
 
     def __init__(
         self,
@@ -141,7 +143,7 @@ class _Search:
             gaps = side * self._gaps(at)
 
     def _points(self, closings: NDArray[np.float64]) -> NDArray[np.float32]:
-        """The vertex on its way, shape (n, 3)."""
+        """World positions of the vertex at closings (n,) [m], shape (n, 3)."""
         count = len(closings)
         posed = np.repeat(self._angles[None], count, axis=0)
         for k, joint in enumerate(self._chain.joints[0].tolist()):
@@ -157,12 +159,12 @@ class _Search:
         return self._covering.points(poses, [self._vertex])[:, 0]
 
     def _gaps(self, closings: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distances less the one asked for [m], shape (n,)."""
+        """Signed distances minus the target distance [m], shape (n,)."""
         self._seen += len(closings)
         return np.array([d for d, _, _ in self._hits(closings)]) - self._target
 
     def _hits(self, closings: NDArray[np.float64]) -> list[tuple[float, int, NDArray[np.float64]]]:
-        """Distance, facet, and nearest point in the object's frame or place in the facet's basis."""
+        """Distance, facet, and nearest point in the object's frame (or position in the basis of a chosen facet)."""
         points = self._points(closings)
         if self._facet >= 0:
             at = facet_distance(points, self._objects.objects[self._thing], self._facet, self._place)
@@ -173,6 +175,6 @@ class _Search:
         return [(float(d), int(f), p) for d, f, p in zip(found.distance[0], found.face[0], own, strict=True)]
 
     def _end(self, status: SearchStatus, closing: float) -> _End:
-        # as single precision, in which it is told, has it
+        # evaluated at the closing rounded to float32, which is the closing that is returned
         ((distance, facet, point),) = self._hits(np.array([float(np.float32(closing))]))
         return _End(status, float(closing), distance, facet, point, self._seen)

@@ -1,4 +1,4 @@
-"""Semi-automatic flexion: the angle at which a chosen point of the skin touches an object (A §7.3, R74, R76, C20)."""
+"""Flexion search: the joint angle at which a chosen vertex of the skin touches an object (A §7.3, R74, R76, C20)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from warpjld.grasp.facet import inside_facets
 from warpjld.grasp.objects import Places
 from warpjld.grasp.packing import drives_on, posture_on, skin_on
 from warpjld.grasp.sampled_search import is_sampled, sampled_search
-from warpjld.grasp.search_result import Found, SearchStatus
+from warpjld.grasp.search_result import SearchResult, SearchStatus
 from warpjld.grasp.searches import Searches, SearchRows, search_rows
 from warpjld.runtime.threads import in_threads, threads_for
 from warpjld.skeleton import CHANNELS, Poses
@@ -25,13 +25,13 @@ from warpjld.skeleton import CHANNELS, Poses
 __all__ = ["FINEST", "FlexionSearch"]
 
 FINEST = 1e-7
-"""Smallest tolerance ε [m], which single precision can tell."""
+"""Smallest tolerance ε [m] that single precision resolves."""
 
-_SPLIT_BELOW = 500  # searches a thread must have before splitting pays
+_SPLIT_BELOW = 500  # searches per thread below which work is not split further
 
 
 class FlexionSearch:
-    """Searches for one surface among some objects; keeps what does not change from call to call.
+    """Flexion searches of one surface on a set of objects; keeps the search structures from call to call.
 
     Args:
         coverings: The covering, or parameter sets of it (``with_parameters``); of the smooth or the paper's method.
@@ -57,19 +57,19 @@ class FlexionSearch:
         places: Places | None = None,
         tolerance: float = 1e-6,
         threads: int | None = None,
-    ) -> Found:
-        """All searches in one launch; each gives bit for bit what it gives alone.
+    ) -> SearchResult:
+        """Run all searches in one launch; the result of each is bit for bit the same in any batch.
 
-        Only the vertex asked for is mapped (R74). A search moves the vertex by steps no longer than its distance
-        allows until the distance, less the one asked for, changes its sign, from outside in or from inside out; that
-        bracket is halved until |DIST(α) − DIST| < ε. Contacts that last for less than a 64th of the joint's range and
-        go less than about a millimetre deep may be missed.
+        Only the given vertex is deformed (R74). A search moves it by steps bounded by its distance until the distance
+        minus the target distance changes sign, from outside in or from inside out; that bracket is bisected until
+        |DIST(α) − DIST| < ε. Contacts that last for less than 1/64 of the joint's range and are less than about 1 mm
+        deep may be missed.
 
         Args:
             poses: F poses to start from.
             angles: Joint angles of these poses [rad], shape (F, J, 4).
-            searches: What to search for.
-            places: Placements that ``searches.place`` counts; by default each object's own.
+            searches: The searches.
+            places: Placements that ``searches.place`` refers to; by default each object's own.
             tolerance: ε [m].
             threads: CPU threads; by default all cores where there is enough to do.
 
@@ -103,7 +103,7 @@ class FlexionSearch:
         places: Places,
         tolerance: float,
         threads: int | None,
-    ) -> Found:
+    ) -> SearchResult:
         import warp as wp
         from warpjld_kernels.flexion_search import search
 
@@ -127,7 +127,7 @@ class FlexionSearch:
         in_threads(span, len(rows), threads if device.is_cpu else 1, search, device)
         status, closing, distance, facet, point, evaluations = (out.numpy() for out in outs)
         bent = rows.chains[rows.drive].angles(closing.astype(np.float64))
-        return Found(status, closing, bent, distance, facet, self._inside(rows, point), point, evaluations)
+        return SearchResult(status, closing, bent, distance, facet, self._inside(rows, point), point, evaluations)
 
     def nearest(
         self,
@@ -138,10 +138,14 @@ class FlexionSearch:
         places: Places | None = None,
         tolerance: float = 1e-6,
         threads: int | None = None,
-    ) -> Found:
-        """As ``run``, either way from where the joints are: of two contacts that of the smaller turn (A §7.3, R142).
+    ) -> SearchResult:
+        """Search in both directions from the present angles; of two contacts take the nearer one (A §7.3, R142).
 
-        Where neither way leads to one, the closer approach.
+        Without a contact in either direction, the closer of the two closest approaches is taken. Arguments as for
+        ``run``.
+
+        Raises:
+            InputError: As for ``run``, or a ``stop``, which has no meaning here.
         """
         if searches.stop is not None:
             raise InputError("searches: a stop belongs to one direction; a search either way ends at the limits")
@@ -167,7 +171,7 @@ class FlexionSearch:
             raise InputError(f"tolerance: want {FINEST:g} m or more, which float32 can tell, got {tolerance:g}")
 
     def _tasks(self, rows: SearchRows, places: Places, origin: NDArray[np.float64]) -> list[Any]:
-        """What each search looks for, on the device; places relative to the frames' origins (F, 3)."""
+        """Kernel inputs of the searches; placements relative to the frames' origins (F, 3) [m]."""
         import warp as wp
 
         device = self.objects.device
@@ -182,7 +186,7 @@ class FlexionSearch:
         ]
 
     def _inside(self, rows: SearchRows, point: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Whether the foot of the perpendicular lies in the facet that was asked for, shape (N,)."""
+        """Whether the foot of the perpendicular lies in the chosen facet, shape (N,); true where none was chosen."""
         inside = np.ones(len(rows), dtype=bool)
         for k, thing in enumerate(self.objects.objects):
             own = np.flatnonzero((rows.thing == k) & (rows.facet >= 0))

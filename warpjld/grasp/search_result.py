@@ -1,4 +1,4 @@
-"""What flexion searches ended with, in numbers and in words (C20)."""
+"""Results and statuses of flexion searches (C20)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Found", "SearchStatus"]
+__all__ = ["SearchResult", "SearchStatus"]
 
 
 class SearchStatus(IntEnum):
-    """How a search ended; ``message`` is for people."""
+    """Status of a search; docs/reference/statuses.md explains each. ``message`` is a readable text."""
 
     CONVERGED = 0
     NO_CONTACT = 1
@@ -23,7 +23,7 @@ class SearchStatus(IntEnum):
 
     @property
     def message(self) -> str:
-        """In words."""
+        """Readable text of the status."""
         return (
             "converged",
             "no contact within the joint's limits",
@@ -35,20 +35,20 @@ class SearchStatus(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SearchResult:
     """Results of N searches, in their order.
 
     Attributes:
         status: Values of ``SearchStatus``, shape (N,).
-        closing: How far the chain closed [rad at rate 1], shape (N,), negative where ``FlexionSearch.nearest`` turned
-            it the other way; the closest approach where there is no contact.
-        angles: Flexion of the joints there [rad], shape (N, 4); for a single joint the first column.
-        distance: Signed distance there [m], shape (N,): the true residual is this less the distance asked for.
-        facet: Triangle touched or nearest, a row of the object's faces, shape (N,); ``thing.facet_of`` has the file's
-            own number.
+        closing: Closing of the chain [rad at rate 1], shape (N,), negative where ``FlexionSearch.nearest`` found the
+            contact in the other direction; at the closest approach where there is no contact.
+        angles: Flexion of the joints at that closing [rad], shape (N, 4); for a single joint the first column.
+        distance: Signed distance at that closing [m], shape (N,); the residual is this minus the target distance.
+        facet: Triangle touched or nearest, a row of the object's faces, shape (N,); ``thing.facet_of`` gives the
+            file's own number.
         inside: Whether the foot of the perpendicular lies in the facet (C19), shape (N,); true for ``NEAREST``.
-        point: Nearest point in the object's frame, or the place in the chosen facet's basis [m], shape (N, 3).
-        evaluations: Mappings of the vertex, shape (N,).
+        point: Nearest point in the object's frame, or position in the chosen facet's basis [m], shape (N, 3).
+        evaluations: How often the vertex was deformed, shape (N,).
     """
 
     status: NDArray[np.int32]
@@ -60,16 +60,16 @@ class Found:
     point: NDArray[np.float32]
     evaluations: NDArray[np.int32]
 
-    def where(self, first: NDArray[np.bool_], other: Found) -> Found:
-        """These results, and in the rows that are not chosen those of others of the same searches."""
+    def where(self, first: NDArray[np.bool_], other: SearchResult) -> SearchResult:
+        """Row-wise choice between two results of the same searches: these where ``first`` (N,), else ``other``."""
         pick = {}
         for field in fields(self):
             own, its = getattr(self, field.name), getattr(other, field.name)
             pick[field.name] = np.where(first.reshape(-1, *[1] * (own.ndim - 1)), own, its)
-        return Found(**pick)
+        return SearchResult(**pick)
 
     def message(self, n: int = 0) -> str:
-        """What became of a search, for people."""
+        """Readable text about search ``n``: its status with angle and distance."""
         status = SearchStatus(int(self.status[n]))
         angle, distance = np.degrees(self.angles[n, 0]), 1e3 * float(self.distance[n])
         if status is SearchStatus.CONVERGED:

@@ -1,4 +1,4 @@
-"""What flexion searches look for, checked and laid out one search a row."""
+"""Specification of flexion searches, validated and expanded to one row per search."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from warpjld.skeleton.channels import FLEXION
 __all__ = ["NEAREST", "SearchRows", "Searches", "search_rows"]
 
 NEAREST = -1
-"""In place of a facet's number: whatever facet is nearest."""
+"""Facet number that means: the nearest facet, whichever it is."""
 
-_MOST_JOINTS = 4
+_MOST_JOINTS = 4  # of a chain in the kernels
 
 
 @dataclass(frozen=True, eq=False)
 class Searches:
-    """What to search for; every field is one value or one for each of N searches.
+    """N flexion searches; every field is one value for all or one for each.
 
     Attributes:
-        vertex: Vertex of the surface that is to touch, a row; ``surface.weld`` leads there from the file's number.
-        joint: Joint that bends; or, shape (N, up to 4), joints that bend together, each beyond the one before.
-        frame: Pose it starts from.
-        covering: Parameter set.
-        thing: Object.
-        facet: Triangle of the object whose plane is to be touched (R73), or ``NEAREST``; ``thing.triangles_of`` leads
-            there from the file's facet.
-        distance: Distance to stop at [m] (the paper's DIST).
-        place: Row of the places given with the search.
-        rate: Turn of each joint for a closing of one; 1 bends, -1 stretches. Shape (N, up to 4) for several joints.
-        stop: Flexion at which each joint stays [rad]; by default its limit in the direction of its rate.
+        vertex: Vertex of the surface that is to touch, a row; ``surface.weld`` converts the file's vertex numbers.
+        joint: Joint that flexes; or, shape (N, up to 4), joints that flex together, each beyond the one before.
+        frame: Number of the pose to start from.
+        covering: Number of the parameter set.
+        thing: Number of the object.
+        facet: Triangle of the object whose plane is to be touched (R73), or ``NEAREST``; ``thing.triangles_of``
+            converts the file's facet numbers.
+        distance: Target distance [m] (the paper's DIST).
+        place: Row of the placements given with the search; by default the object's number.
+        rate: Rotation of each joint per unit of closing; 1 flexes, -1 extends. Shape (N, up to 4) for several joints.
+        stop: Flexion at which each joint stops [rad]; by default its limit in the direction of its rate.
     """
 
     vertex: ArrayLike
@@ -54,9 +54,9 @@ class Searches:
 
 @dataclass(frozen=True, eq=False)
 class SearchRows:
-    """N searches, one a row: the fields of ``Searches`` with shape (N,), checked.
+    """N searches, one per row: the validated fields of ``Searches``, each of shape (N,).
 
-    ``drive`` is the row of ``chains``, joints that close together in some frame, which a search moves.
+    ``drive`` is the row of ``chains`` that a search moves; equal chains of the same frame are shared.
     """
 
     vertex: NDArray[np.int64]
@@ -83,19 +83,19 @@ def search_rows(
     coverings: int,
     places: int,
 ) -> SearchRows:
-    """Lay out searches one a row.
+    """Validate searches and expand them to one row each.
 
     Args:
-        searches: What to search for.
-        skeleton: Of J joints.
+        searches: The searches.
+        skeleton: Skeleton with J joints.
         angles: Joint angles of F frames [rad], shape (F, J, 4).
         things: The objects.
-        vertices: Vertices of the surface.
-        coverings: Parameter sets there are.
-        places: Places there are.
+        vertices: Number of vertices of the surface.
+        coverings: Number of parameter sets.
+        places: Number of placements.
 
     Raises:
-        InputError: No search, fields that do not fit one another, name what does not exist, or are not finite.
+        InputError: No search, fields whose shapes do not fit, indices out of range, or numbers that are not finite.
     """
     fields = {
         "vertex": searches.vertex,
@@ -134,7 +134,7 @@ def search_rows(
 
 
 def _chain_columns(searches: Searches, joint_count: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Joints, rates and stops, shape (1 or N, 4); -1, 0 and NaN where there are fewer joints."""
+    """Joints, rates and stops, each (1 or N, 4), padded with -1, 0 and NaN where there are fewer joints."""
     joints = np.asarray(searches.joint, dtype=np.int64)
     joints = joints.reshape(-1, 1) if joints.ndim < 2 else joints
     if joints.ndim != 2 or not joints.size or joints.shape[1] > _MOST_JOINTS:
@@ -165,7 +165,7 @@ def _chains(
     rates: NDArray[np.float64],
     stops: NDArray[np.float64],
 ) -> Chains:
-    """Chains with the angles they start from, and their limits where no stop is given."""
+    """Chains with their start angles, and with the joints' limits where no stop is given."""
     used = np.where(joints >= 0, joints, 0)
     starts = angles[frame[:, None], used, FLEXION]
     low, high = np.moveaxis(skeleton.limits[used, FLEXION], -1, 0)
@@ -176,7 +176,7 @@ def _chains(
 
 
 def _distinct(columns: Sequence[NDArray]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First rows of all different rows of a table given by columns, and every row's number among them."""
+    """Unique rows of a table given by columns: index of the first of each, and for every row its unique number."""
     code = np.zeros(len(columns[0]), dtype=np.int64)
     for column in columns:
         if (column != column[0]).any():

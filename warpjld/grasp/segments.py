@@ -1,4 +1,4 @@
-"""The sixteen parts of a hand that touch things: the digits' segments, and the palm."""
+"""The sixteen contact regions of a hand: three segments of each digit, and the palm."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from warpjld.skeleton.hand import FINGER_JOINTS
 __all__ = ["SEGMENTS", "vertex_segments"]
 
 SEGMENTS = (*(f"{digit}.{joint}" for digit in reversed(DIGITS) for joint in FINGER_JOINTS[:3]), "palm")
-"""Each named after the joint it begins at; thumb first, the palm with its carpus last."""
+"""Their names: each segment has that of the joint it begins at, thumb first; the palm, with the carpus, is last."""
 
 
 def vertex_segments(covering: Covering, side: str = "") -> NDArray[np.int64]:
-    """Place in ``SEGMENTS`` of every vertex, shape (V,); -1 for what is no hand, or not the hand of that side."""
+    """Index into ``SEGMENTS`` of every vertex, shape (V,); -1 for vertices of no hand, or not of that side's hand."""
     segment = np.array([_segment(fan.name, side) for fan in covering.fans])
     return np.asarray(segment[covering.domains.argmax(axis=1)])
 
 
 def _segment(fan: str, side: str) -> int:
-    """Place in ``SEGMENTS`` of what an operator of the covering moves."""
+    """Index into ``SEGMENTS`` of the vertices of an operator, by its name."""
     if side and not fan.startswith(f"{side}."):
         return -1
     name = fan.removeprefix("left.").removeprefix("right.")

@@ -19,17 +19,17 @@ from warpjld.grasp.objects import GraspObject, make_object
 
 __all__ = ["SHAPES", "ball", "box", "cylinder", "glass", "plate"]
 
-_MOST = 24  # edges along a side of a box, so that tables stay light
-_EDGE = 0.004  # length of an edge on flat and straight parts [m]
+_MOST = 24  # largest number of edges along a side of a box, so that large boxes have few triangles
+_EDGE = 0.004  # edge length on flat and straight parts [m]
 
 
 def ball(diameter: float = 0.065, *, subdivisions: int = 4, name: str = "ball") -> GraspObject:
-    """A ball: an icosahedron split ``subdivisions`` times (4: 5,120 triangles), corners on the sphere.
+    """A ball: an icosphere, subdivided ``subdivisions`` times (4: 5,120 triangles).
 
     Args:
-        diameter: In metres.
+        diameter: Diameter [m].
         subdivisions: 0 … 7.
-        name: For messages.
+        name: Name for messages.
 
     Raises:
         InputError: A size or a number out of range.
@@ -121,7 +121,7 @@ SHAPES: dict[str, Callable[..., GraspObject]] = {
 
 
 def _turned(name: str, origin: str, profile: list[tuple[float, ...]], segments: int) -> GraspObject:
-    """A profile (radius, height) from the axis to the axis, anticlockwise, turned about Y."""
+    """Surface of revolution about Y of a profile (radius, height) [m] from axis to axis, anticlockwise."""
     if not 3 <= segments <= 2048:
         raise InputError(f"segments: want 3 to 2048, got {segments}")
     rows = _subdivided(np.array(profile, dtype=np.float64))
@@ -155,7 +155,7 @@ def _subdivided(profile: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _split(points: NDArray[np.float64], faces: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Every triangle into four."""
+    """One midpoint subdivision: every triangle becomes four."""
     triangles = np.asarray(faces)
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     unique, place = np.unique(edges, axis=0, return_inverse=True)

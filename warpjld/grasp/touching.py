@@ -1,19 +1,19 @@
-"""Patches of contact of skins and an object, from the points that are near enough only."""
+"""Contact patches of many hands on an object; exact distances are computed only for points that can be in contact."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.near_object import NearObject, NearPoints
 from warpjld.grasp.quality.touch import ContactPatches, contact_patches
 from warpjld.grasp.segments import SEGMENTS
+from warpjld.grasp.subdivided_skin import FinerSkin
 
 __all__ = ["touching_patches"]
 
-_TOGETHER = 16  # hands, which bounds memory
-_SLACK = 1e-6  # what float32 may add to a bound [m]
+_TOGETHER = 16  # hands per batch, which bounds memory
+_SLACK = 1e-6  # rounding error of a float32 bound [m]
 
 
 def touching_patches(
@@ -26,8 +26,8 @@ def touching_patches(
     """``contact_patches`` by segment of every hand, and the depth of its skin's deepest point in the object [m], (G,).
 
     Args:
-        finer: The skin's points.
-        segments: Place in ``SEGMENTS`` of every such point, shape (n,); -1 where it is of no interest.
+        finer: Sample points of the skin.
+        segments: Index into ``SEGMENTS`` of every sample point, shape (n,); -1 for points to be ignored.
         near: The object.
         local: G deformed skins in the object's frame [m], shape (G, V, 3).
         tolerance: Largest distance that counts as contact [m].
@@ -35,17 +35,17 @@ def touching_patches(
     patches: list[ContactPatches] = []
     depths = np.zeros(len(local))
     for first in range(0, len(local), _TOGETHER):
-        some = slice(first, first + _TOGETHER)
-        points, hand, row, found = _near_points(finer, near, local[some], tolerance)
+        batch = slice(first, first + _TOGETHER)
+        points, hand, row, found = _near_points(finer, near, local[batch], tolerance)
         patches += _patches(finer, segments, near, points, hand, row, found, tolerance)
-        np.maximum.at(depths[some], hand, -found.distance)
+        np.maximum.at(depths[batch], hand, -found.distance)
     return patches, depths
 
 
 def _near_points(
     finer: FinerSkin, near: NearObject, skins: NDArray[np.floating], tolerance: float
 ) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NearPoints]:
-    """Points of skins (G, n, 3), and of those that may touch the hand, the number and what is nearest, shape (k,)."""
+    """Sample points of skins (G, n, 3); hand, row and closest point of the k of them that may touch, each (k,)."""
     points = finer.points(skins)
     coarse = near.at_least(skins) - finer.longest_edges(skins) - _SLACK
     hand, row = np.nonzero((coarse <= tolerance)[:, finer.parents])
@@ -62,14 +62,14 @@ def _patches(
     found: NearPoints,
     tolerance: float,
 ) -> list[ContactPatches]:
-    """Patches of all hands at once: a segment of another hand is another part."""
+    """Patches of all hands in one call: (hand, segment) pairs are the parts."""
     count, parts = points.shape[1], len(SEGMENTS)
     close = np.flatnonzero((found.distance <= tolerance) & (segments[row] >= 0))
     faces = np.concatenate(
         [finer.faces[finer.faces_around(row[close[hand[close] == g]])] + g * count for g in range(len(points))]
     )
     used, corners = np.unique(faces, return_inverse=True)
-    # points beside those that touch have not all their triangles here, and count for nothing else
+    # points next to those in contact only complete triangles; they stay at infinite distance
     distance, nearest = np.full(len(used), np.inf), np.zeros((len(used), 3))
     outward, part = np.zeros((len(used), 3)), np.full(len(used), -1)
     place = np.searchsorted(used, hand[close] * count + row[close])
@@ -88,11 +88,11 @@ def _patches(
     )
     owner = np.array([int(name.partition(" ")[0]) for name in every.names], dtype=np.int64)
     ends = np.searchsorted(owner, np.arange(len(points) + 1))
-    return [_some(every, slice(ends[g], ends[g + 1])) for g in range(len(points))]
+    return [_of_hand(every, slice(ends[g], ends[g + 1])) for g in range(len(points))]
 
 
-def _some(patches: ContactPatches, rows: slice) -> ContactPatches:
-    """Patches of one hand, under their segments' names."""
+def _of_hand(patches: ContactPatches, rows: slice) -> ContactPatches:
+    """Patches of one hand, named after their segments."""
     names = tuple(name.partition(" ")[2] for name in patches.names[rows])
     return ContactPatches(
         names,

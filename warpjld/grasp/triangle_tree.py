@@ -1,8 +1,8 @@
-"""A tree of boxes round the triangles of a surface, eight children a node and eight triangles a leaf.
+"""Bounding-volume hierarchy of the triangles of a surface: eight children per node, eight triangles per leaf.
 
-Triangles are halved at the median of their centres along the longest side of their box, over and over, down to groups
-of eight; eight groups that follow one another are a node's children, and so on up. All groups but the last are full, so
-the whole tree is built by sorting rows of arrays.
+Triangles are split recursively at the median of their centroids along the longest side of their box, down to groups of
+eight; eight consecutive groups are the children of a node, and so on up. All groups but the last are full, so the whole
+tree is built by sorting rows of arrays.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 __all__ = ["TriangleTree", "build_tree", "halved", "join_trees"]
 
-_WIDTH = 8
-_MARGIN = np.float32(4e-7)  # of the largest coordinate: points are rounded to float32 for the boxes
-_NOWHERE = np.float32(1e18)  # a box that no point is near to
+_WIDTH = 8  # children of a node, triangles of a leaf
+_MARGIN = np.float32(4e-7)  # margin of the boxes relative to the largest coordinate, against float32 rounding
+_NOWHERE = np.float32(1e18)  # corner of an empty box, far from every point
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +24,11 @@ class TriangleTree:
     """Trees in the form that ``warpjld_kernels.triangle_tree.Tree`` describes.
 
     Attributes:
-        root: Root of every surface's tree, shape (O,).
-        child: First child of every node, shape (n,).
-        boxes: Lower and upper corners of the children's boxes, shape (n, 2, 3, 8).
-        corners: Corners of the leaves' triangles, shape (leaves, 3, 3, 8).
-        face: Their numbers, shape (leaves, 8).
+        root: Root node of every surface's tree, shape (O,).
+        child: First child of every node, shape (n,); −1 − leaf where the children are leaves.
+        boxes: Lower and upper corners of the children's boxes [m], shape (n, 2, 3, 8).
+        corners: Corners of the leaves' triangles [m], shape (leaves, 3, 3, 8).
+        face: Indices of these triangles, shape (leaves, 8).
     """
 
     root: NDArray[np.int32]
@@ -39,7 +39,7 @@ class TriangleTree:
 
 
 def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> TriangleTree:
-    """The tree of one surface.
+    """Build the tree of one surface.
 
     Args:
         vertices: Positions [m], shape (n, 3).
@@ -48,7 +48,7 @@ def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Trian
     corner = vertices.astype(np.float32)[faces]
     order = halved(corner.mean(axis=1, dtype=np.float64))
     leaves = -(-len(faces) // _WIDTH)
-    # the last leaf is filled up with its last triangle
+    # the last leaf is padded with copies of the last triangle
     order = np.concatenate([order, np.repeat(order[-1:], leaves * _WIDTH - len(order))]).reshape(leaves, _WIDTH)
     inside = corner[order]
     margin = _MARGIN * np.abs(corner).max()
@@ -80,7 +80,7 @@ def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Trian
 
 
 def join_trees(trees: list[TriangleTree]) -> TriangleTree:
-    """Several surfaces' trees one after another."""
+    """Concatenate the trees of several surfaces."""
     nodes = np.cumsum([0, *(len(t.child) for t in trees)])
     leaves = np.cumsum([0, *(len(t.face) for t in trees)])
     return TriangleTree(
@@ -95,7 +95,7 @@ def join_trees(trees: list[TriangleTree]) -> TriangleTree:
 
 
 def halved(centre: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Order of points in which every aligned group of 8 · 2^k is one side of a cut."""
+    """Order of points (n, 3) by recursive median splits: every aligned group of 8 · 2^k is one side of a split."""
     count = len(centre)
     size = _WIDTH
     while size < count:

@@ -1,4 +1,4 @@
-"""What is too wide for one hand is taken by two: palms opposed across it (A §10, R90)."""
+"""Grasp search with two hands for objects too wide for one: palms opposed across the object (A §10, R90)."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from scipy.spatial import cKDTree
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import unit
-from warpjld.grasp.auto import AutoGrasp
 from warpjld.grasp.close import Closed, Closer
-from warpjld.grasp.draws import WAY, preference
+from warpjld.grasp.find_grasp import AutoGrasp
 from warpjld.grasp.judge import Judge, Pressing, Verdict, check_friction
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.placements import Candidates, around, palms_on
 from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.random_placements import WAY, preference
 from warpjld.grasp.widths import Widths, sample_widths
 
 __all__ = ["find_two_handed"]
 
 _SIDES = ("left", "right")
-_LINES = 400  # through the object, to find where it has opposite sides
-_ROUND = 24  # placements closed together
-_DEEPEST = 6e-4  # of hands and object in one another, above which a grasp is refused [m]
-_APART = 5e-3  # between the skins of the two hands at least [m]
-_COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # parts of the way at which a hand must not be in an obstacle
+_LINES = 400  # random lines through the object, to find opposite sides
+_ROUND = 24  # placements per round (batch)
+_DEEPEST = 6e-4  # largest penetration of hands and object in a grasp that is accepted [m]
+_APART = 5e-3  # smallest distance between the skins of the two hands [m]
+_COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # distances back along the approach, in units of WAY, at which collisions are tested
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """One of the two hands on the object, and how G placements of it ended."""
+    """One of the two hands with its search structures for the object."""
 
     name: str
     closer: Closer
@@ -42,7 +42,7 @@ class _Side:
     around: Obstacles
 
     def closed(self, aim: NDArray[np.float64], look: NDArray[np.float64], fingers: NDArray[np.float64]) -> _Ended:
-        """Palms at points (G, 3), looking and pointing along unit directions, brought to the object and closed."""
+        """Place G hands by palm centre, palm normal and direction of the fingers, each (G, 3), and close them."""
         covering = self.closer.covering
         skeleton = covering.skeleton
         hands = palms_on(covering, skeleton.initial, self.closer.both.near, self.name, aim, look, fingers)
@@ -61,6 +61,16 @@ class _Side:
 
 @dataclass(frozen=True, eq=False)
 class _Ended:
+    """Results of one hand in G placements.
+
+    Attributes:
+        hands: The open hands.
+        closed: The closed hands.
+        skins: Their skins [m], shape (G, V, 3).
+        pressing: Their contacts that can press.
+        clear: Mask of those that enter no obstacle, shape (G,).
+    """
+
     hands: Candidates
     closed: Closed
     skins: NDArray[np.float32]
@@ -77,25 +87,25 @@ def find_two_handed(
     friction: float = 0.6,
     seed: int = 0,
 ) -> dict[str, AutoGrasp]:
-    """Place two open hands on opposite sides of an object, close them, judge both together, keep the best.
+    """Find a grasp with two hands: place them on opposite sides of the object, close, judge both together.
 
-    The palms look at one another along a line that friction holds between its two ends; the fingers of both point the
-    same way. A grasp counts if the contacts of both together are force closed, both hands press, and neither is more
-    than 0.6 mm in the object or nearer than 5 mm to the other.
+    The palms face one another along a line through the object whose ends lie within the friction cones; the fingers of
+    both point in the same direction. A grasp is accepted if the contacts of both hands together are force closed, both
+    hands press, neither penetrates the object by more than 0.6 mm, and the hands stay 5 mm apart.
 
     Args:
         hands: The hands by side, ``left`` and ``right``, smooth method.
-        thing: The object, where it stands.
-        obstacles: Other objects where they stand.
-        count: Placements at most.
+        thing: The object at its own placement.
+        obstacles: Other objects at their placements.
+        count: Largest number of placements.
         friction: Coulomb coefficient.
-        seed: Of the sampling.
+        seed: Seed of the random numbers.
 
     Returns:
-        The grasp of each side; both have the verdict of the two together.
+        The grasp of each side; both have the verdict on the two together.
 
     Raises:
-        InputError: A side is missing, the object has no opposite sides, or no placement ends in a grasp.
+        InputError: A side is missing, the object has no opposite sides, or no placement led to a grasp.
     """
     if sorted(hands) != sorted(_SIDES):
         raise InputError(f"hands: want a left and a right one, got {', '.join(hands) or 'none'}")
@@ -114,10 +124,10 @@ def find_two_handed(
     best: dict[str, AutoGrasp] = {}
     tried = 0
     while tried < count and not (best and 2 * tried >= count):
-        some = min(_ROUND, count - tried)
-        tried += some
-        ended = _placed(sides, widths, near.thing, some, rng)
-        for g in range(some):
+        batch = min(_ROUND, count - tried)
+        tried += batch
+        ended = _placed(sides, widths, near.thing, batch, rng)
+        for g in range(batch):
             verdict = _together(sides, ended, g, friction)
             if verdict is not None and verdict.score > (best["left"].score if best else 0.0):
                 best = {side.name: _grasp(side, one, g, verdict, tried) for side, one in zip(sides, ended, strict=True)}
@@ -140,7 +150,7 @@ def _side(
 def _placed(
     sides: list[_Side], widths: Widths, thing: GraspObject, count: int, rng: np.random.Generator
 ) -> list[_Ended]:
-    """Both hands at the ends of widths drawn at random, near the centre of mass rather."""
+    """Place and close both hands at the ends of random widths, preferably near the centre of mass."""
     picked = widths[rng.choice(len(widths), size=count, p=preference(widths, thing))]
     line = unit(picked.second - picked.first)
     fingers, turned = around(line, rng), rng.random(count)[:, None] < 0.5
@@ -150,7 +160,7 @@ def _placed(
 
 
 def _together(sides: list[_Side], ended: list[_Ended], g: int, friction: float) -> Verdict | None:
-    """Judgement of both hands at once; None where one does not press, is too deep, blocked or by the other."""
+    """Verdict on both hands together; None where one does not press, penetrates, is blocked, or is near the other."""
     pressing = [one.pressing[g] for one in ended]
     if not all(len(one.contacts) for one in pressing) or not all(one.clear[g] for one in ended):
         return None

@@ -1,4 +1,4 @@
-"""Checking an object's surface: what can be mended is mended and told, what cannot is refused."""
+"""Validation and repair of an object's surface: orientation, degenerate and duplicate triangles, non-manifold edges."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.quality import enclosed_volume
 from warpjld.errors import InputError
 from warpjld.geometry.winding import winding_numbers
-from warpjld.grasp.crowded_edges import pairs_round_edge, separate_pieces, turned_patches
+from warpjld.grasp.non_manifold_edges import pairs_round_edge, separate_pieces, turned_patches
 
 __all__ = ["Mended", "MeshReport", "mend"]
 
-_FLAT = 1e-9  # height of a triangle over its longest edge below which it counts as degenerate
+_FLAT = 1e-9  # ratio of a triangle's height to its longest edge below which it is degenerate
 
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What was found on a surface.
+    """Defects found on a surface, and what was repaired.
 
     Attributes:
-        degenerate: Triangles without area, taken out.
-        duplicates: Triangles that were there before, taken out.
-        flipped: Triangles turned round so that all look outwards.
-        open_edges: Edges with a triangle on one side only.
-        components: Connected pieces.
-        crossing: Triangles that pass through others.
-        crowded: Edges with more than two triangles, where pieces meet that were told apart.
-        solid: Whether it is the border of a solid: closed, all pieces outward (or cavities, inward), none crossing.
-            Only then does the nearest point alone tell inside from outside; elsewhere the winding number does.
+        degenerate: Number of triangles without area, removed.
+        duplicates: Number of repeated triangles, removed.
+        flipped: Number of triangles whose orientation was reversed so that all face outwards.
+        open_edges: Number of edges with a triangle on one side only.
+        components: Number of connected pieces.
+        crossing: Number of triangles that intersect others.
+        non_manifold: Number of edges with more than two triangles; the pieces that meet there were separated.
+        solid: Whether the surface bounds a solid: closed, all pieces oriented outwards (cavities inwards), none
+            intersecting. Only then is the sign of the distance taken from the closest point; otherwise from the winding
+            number.
     """
 
     degenerate: int = 0
@@ -43,7 +44,7 @@ class MeshReport:
     components: int = 1
     crossing: int = 0
     solid: bool = True
-    crowded: int = 0
+    non_manifold: int = 0
 
     @property
     def watertight(self) -> bool:
@@ -51,22 +52,22 @@ class MeshReport:
         return self.open_edges == 0
 
     def notes(self) -> list[str]:
-        """What a user should know; empty where nothing is amiss."""
+        """Readable texts about the defects; empty where there are none."""
         found = []
         if self.degenerate:
-            found.append(f"{self.degenerate} degenerate triangles taken out")
+            found.append(f"{self.degenerate} degenerate triangles removed")
         if self.duplicates:
-            found.append(f"{self.duplicates} duplicate triangles taken out")
+            found.append(f"{self.duplicates} duplicate triangles removed")
         if self.flipped:
-            found.append(f"{self.flipped} triangles turned to look outwards")
-        if self.crowded:
+            found.append(f"{self.flipped} triangles flipped to face outwards")
+        if self.non_manifold:
             found.append(
-                f"{self.crowded} edges belong to more than two triangles: pieces that meet there are told apart"
+                f"{self.non_manifold} edges belong to more than two triangles: pieces that meet there are separated"
             )
         if self.open_edges:
             found.append(f"not watertight: {self.open_edges} open edges; inside and outside by winding number")
         if self.crossing:
-            found.append(f"{self.crossing} triangles cross others; inside and outside by winding number")
+            found.append(f"{self.crossing} triangles intersect others; inside and outside by winding number")
         if self.watertight and not self.crossing and not self.solid:
             found.append("pieces touch or lie inside one another; inside and outside by winding number")
         return found
@@ -74,14 +75,14 @@ class MeshReport:
 
 @dataclass(frozen=True, eq=False)
 class Mended:
-    """A surface with degenerate and duplicate triangles taken out and all triangles looking outwards.
+    """A repaired surface.
 
     Attributes:
-        vertices: Those in use [m], shape (n, 3).
-        faces: Triangles, shape (t, 3).
-        report: What was found.
-        used: Vertex before, of every vertex, shape (n,).
-        rows: Triangle before, of every triangle, shape (t,).
+        vertices: Positions of the vertices in use [m], shape (n, 3).
+        faces: Triangles, facing outwards, shape (t, 3).
+        report: Defects that were found and repaired.
+        used: Original index of every vertex, shape (n,).
+        rows: Original index of every triangle, shape (t,).
     """
 
     vertices: NDArray[np.float64]
@@ -92,13 +93,13 @@ class Mended:
 
 
 def mend(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Mended:
-    """A surface with degenerate and duplicate triangles taken out and all triangles looking outwards.
+    """Repair a surface: remove degenerate and duplicate triangles, orient all triangles outwards.
+
+    Pieces that share non-manifold edges are separated; each gets vertices of its own.
 
     Args:
         vertices: Welded positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-
-    Closed pieces that have edges in common get vertices of their own.
 
     Raises:
         InputError: No triangle with an area, or a one-sided (Möbius) surface.
@@ -110,12 +111,12 @@ def mend(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Mended:
     used, compact = np.unique(kept, return_inverse=True)
     points, triangles = vertices[used], compact.reshape(kept.shape).astype(np.int32)
     edges = _Edges.of(triangles)
-    pairs, crowded = edges.pairs, int((edges.count > 2).sum())
+    pairs, non_manifold = edges.pairs, int((edges.count > 2).sum())
     piece, turn = edges.pieces(pairs)
-    if crowded:
+    if non_manifold:
         turn ^= turned_patches(points, _turned(triangles, turn), piece)[piece]
         edges = _Edges.of(_turned(triangles, turn))
-        pairs = np.concatenate([edges.pairs, edges.pairs_of_crowded(points)])
+        pairs = np.concatenate([edges.pairs, edges.pairs_at_non_manifold(points)])
         piece, wrong = edges.pieces(pairs)
         turn ^= wrong
         points, triangles, own = separate_pieces(points, triangles, piece)
@@ -126,13 +127,13 @@ def mend(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Mended:
     crossing = len(crossing_faces(points, triangles).faces)
     solid = open_edges == 0 and crossing == 0 and _nested_properly(points, triangles, piece)
     report = MeshReport(
-        degenerate, duplicates, int(turn.sum()), open_edges, int(piece.max()) + 1, crossing, solid, crowded
+        degenerate, duplicates, int(turn.sum()), open_edges, int(piece.max()) + 1, crossing, solid, non_manifold
     )
     return Mended(points, triangles, report, used.astype(np.int64), rows)
 
 
 def _without_waste(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], int, int]:
-    """Rows of the faces that are kept, and how many have no area or are there twice."""
+    """Rows of the faces that are kept, the number without area, and the number of duplicates."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     longest = np.max([np.linalg.norm(v, axis=1) for v in (b - a, c - b, a - c)], axis=0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -140,13 +141,15 @@ def _without_waste(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> t
     solid = np.flatnonzero(~flat)
     _, once, times = np.unique(np.sort(faces[solid], axis=1), axis=0, return_index=True, return_counts=True)
     kept, twice = solid[np.sort(once)], (times > 1)[np.argsort(once)]
-    if twice.any():  # where one of a pair would still hang on a closed surface, the pair was a fold without volume
-        kept = kept[~(twice & _on_crowded_edge(faces[kept]))]
+    if (
+        twice.any()
+    ):  # a duplicated face that is left on a non-manifold edge is a fold without volume: remove both copies
+        kept = kept[~(twice & _on_non_manifold_edge(faces[kept]))]
     return kept, int(flat.sum()), len(solid) - len(kept)
 
 
-def _on_crowded_edge(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Faces with an edge of more than two faces."""
+def _on_non_manifold_edge(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Mask of the faces with an edge that belongs to more than two faces, shape (T,)."""
     half = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     _, place, count = np.unique(half, axis=0, return_inverse=True, return_counts=True)
     return np.asarray((count[place] > 2).reshape(3, -1).any(axis=0))
@@ -154,14 +157,14 @@ def _on_crowded_edge(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class _Edges:
-    """Sides of faces, those of an edge one after another.
+    """Sides (half-edges) of faces, sorted so that those of the same edge are consecutive.
 
     Attributes:
-        low: Vertex of the lower number, shape (3 T,); likewise ``high``, and ``opposite``, the face's third.
-        forward: Whether the face runs from low to high.
-        owner: The face.
+        low: End with the lower vertex index, shape (3 T,); likewise ``high``, and ``opposite``, the third corner.
+        forward: Whether the face traverses the side from low to high, shape (3 T,).
+        owner: The face, shape (3 T,).
         begins: First side of every edge, shape (E,).
-        count: Sides of every edge.
+        count: Number of sides of every edge, shape (E,).
     """
 
     low: NDArray[np.int64]
@@ -174,7 +177,7 @@ class _Edges:
 
     @staticmethod
     def of(faces: NDArray[np.int32]) -> _Edges:
-        """Those of triangles (T, 3)."""
+        """Sides of triangles (T, 3)."""
         half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
         opposite = np.concatenate([faces[:, 2], faces[:, 0], faces[:, 1]]).astype(np.int64)
         low, high = half.min(axis=1), half.max(axis=1)
@@ -186,12 +189,12 @@ class _Edges:
 
     @property
     def pairs(self) -> NDArray[np.int64]:
-        """Sides of the edges with two of them, shape (n, 2)."""
+        """Pairs of sides of the manifold edges (those with two sides), shape (n, 2)."""
         first = self.begins[self.count == 2]
         return np.stack([first, first + 1], axis=1)
 
-    def pairs_of_crowded(self, vertices: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Sides that belong together of edges with more than two of them, shape (n, 2)."""
+    def pairs_at_non_manifold(self, vertices: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Pairs of sides that belong together at non-manifold edges, shape (n, 2)."""
         found: list[tuple[int, int]] = []
         for edge in np.flatnonzero(self.count > 2).tolist():
             first = int(self.begins[edge])
@@ -202,19 +205,27 @@ class _Edges:
         return np.array(found, dtype=np.int64).reshape(-1, 2)
 
     def pieces(self, pairs: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """Piece of every face if these sides belong together, and which run against the majority of theirs."""
-        one, other = pairs.T
-        same = self.forward[one] == self.forward[other]
-        return _orientation(len(self.low) // 3, self.owner[one], self.owner[other], same)
+        """Piece of every face when these pairs of sides are joined, and mask of the faces to flip in their piece."""
+        first, second = pairs.T
+        same = self.forward[first] == self.forward[second]
+        return _orientation(len(self.low) // 3, self.owner[first], self.owner[second], same)
 
 
 def _orientation(
     count: int, first: NDArray[np.int64], second: NDArray[np.int64], same: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Piece of every face, and the faces that run against the majority of their piece.
+    """Piece of every face, and mask of the faces whose orientation disagrees with the majority of their piece.
 
-    Every face stands twice in a graph, as it is and turned round; links join the states that fit together. A piece is
-    then two connected parts, one the other turned round, unless the surface has one side only.
+    Graph with two nodes per face, as it is and flipped; edges join orientations that agree. An orientable piece gives
+    two connected components, one the flip of the other; a one-sided surface gives a single one.
+
+    Args:
+        count: Number of faces.
+        first: One face of every pair of neighbours, shape (n,); likewise ``second``.
+        same: Whether the two traverse their common edge in the same direction, shape (n,).
+
+    Raises:
+        InputError: A one-sided surface.
     """
     turn = np.where(same, count, 0)
     rows = np.concatenate([first, first + count])
@@ -231,7 +242,7 @@ def _orientation(
 
 
 def _look_inwards(vertices: NDArray[np.float64], faces: NDArray[np.int32], piece: NDArray[np.int32]) -> NDArray:
-    """Pieces that must be turned: those of negative volume, unless they are cavities of a piece around them."""
+    """Mask of the pieces to flip: those with negative volume, unless they are cavities of the piece around them."""
     pieces = [faces[piece == k] for k in range(int(piece.max()) + 1)]
     volume = np.array([float(enclosed_volume(vertices, part)) for part in pieces])
     inwards = volume < 0.0
@@ -239,7 +250,7 @@ def _look_inwards(vertices: NDArray[np.float64], faces: NDArray[np.int32], piece
     outer = pieces[largest][:, ::-1] if inwards[largest] else pieces[largest]
     for k in range(len(pieces)):
         if inwards[k] != inwards[largest]:
-            # a cavity looks the other way from the piece around it, whichever way that one looked
+            # a cavity is oriented opposite to the piece around it, whichever orientation that one had
             within = winding_numbers(vertices, outer, vertices[pieces[k][:1, 0]])[0] > 0.5
             inwards[k] = inwards[largest] if within else inwards[k]
     return inwards

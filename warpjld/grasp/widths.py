@@ -1,4 +1,4 @@
-"""Where an object can be taken between thumb and fingers: pairs of points opposite to one another on its surface."""
+"""Antipodal point pairs ("widths") of an object's surface, where it can be taken between thumb and fingers."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from warpjld.grasp.near_object import NearObject
 
 __all__ = ["Widths", "sample_widths"]
 
-_SURFACE = 1e-5  # a point this near lies on the surface [m]
-_STEPS = 64  # at most along a line
-_LEAN = 0.4  # how far a line may lean from the normal it starts along, as a tangent
+_SURFACE = 1e-5  # distance below which a point is on the surface [m]
+_STEPS = 64  # largest number of steps along a line
+_LEAN = 0.4  # largest deviation of a line from the normal at its start, per axis, as a tangent
 
 
 @dataclass(frozen=True, eq=False)
 class Widths:
-    """N pairs of points of an object's surface, on the stage.
+    """N pairs of points on an object's surface, in world space.
 
     Attributes:
-        first: Where lines enter [m], shape (N, 3).
-        second: Where they leave, shape (N, 3).
-        slant: Cosine of the larger angle between a line and the normals at its ends, shape (N,).
+        first: Points where lines enter the object [m], shape (N, 3).
+        second: Points where they leave it [m], shape (N, 3).
+        slant: Cosine of the larger of the angles between a line and the normals at its ends, shape (N,).
     """
 
     first: NDArray[np.float64]
@@ -44,10 +44,16 @@ class Widths:
 
 
 def sample_widths(near: NearObject, count: int, rng: np.random.Generator, *, widest: float) -> Widths:
-    """Draw points evenly over an object's surface and look for the point opposite to each.
+    """Draw points uniformly over an object's surface and find the point opposite to each.
 
-    A line goes into the object along the normal, leaning a little at random, and is followed by steps of the distance
-    itself (Hart 1996) until it leaves. Lines longer than ``widest`` [m] are dropped.
+    A line enters the object along the negative normal, randomly tilted, and is followed by sphere tracing (Hart 1996)
+    until it leaves.
+
+    Args:
+        near: The object.
+        count: Number of lines; fewer pairs are returned.
+        rng: Source of random numbers.
+        widest: Lines that do not leave within this length are dropped [m].
     """
     thing = near.thing
     corner = thing.vertices[thing.faces]
@@ -61,7 +67,7 @@ def sample_widths(near: NearObject, count: int, rng: np.random.Generator, *, wid
     left = leaves >= 0
     normal = thing.normals[leaves]
     slant = np.minimum(-(outward * line).sum(axis=1), (normal * line).sum(axis=1))
-    # what leaves at once started at an edge and says nothing
+    # a line that leaves at once started at an edge: not a width of the object
     good = left & (slant > 0.0) & (along > 100.0 * _SURFACE)
     first, second = (thing.place.apply(ends[good])[0] for ends in (local, local + along[:, None] * line))
     return Widths(first, second, slant[good])
@@ -70,7 +76,7 @@ def sample_widths(near: NearObject, count: int, rng: np.random.Generator, *, wid
 def _followed(
     near: NearObject, start: NDArray[np.float64], line: NDArray[np.float64], widest: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """How far lines go until they leave the object [m], and the triangles where they do, −1 where they do not, (n,)."""
+    """Length of lines until they leave the object [m], and the triangles where they do, −1 where they do not, (n,)."""
     import warp as wp
     from warpjld_kernels.lines_to_object import follow_through
 

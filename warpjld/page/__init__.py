@@ -1,2 +1,1 @@
-"""Surfaces in a browser's page, by viser: its server with a guard, the stage's lights, and pages that play by
-themselves."""
+"""3D pages in the browser with viser: a server with access control, scene lighting, and self-contained HTML pages."""

@@ -1,9 +1,8 @@
-"""Who may talk to the studio's server: pages that it served itself, and where it listens to the network those that
-know its token.
+"""Access control of the studio's server: only its own pages may connect, and over the network only with its token.
 
-A browser lets any page open a WebSocket to any address, this machine's own included, and sends along where the page
-is from. So a request counts only if its ``Origin`` is the host it is made to, and if that host is what the server was
-told to be (else a name of the page's own that was made to point here would do).
+A browser lets any page open a WebSocket to any address, including this machine's, and sends the page's origin along. A
+request is therefore accepted only if its ``Origin`` is the host it is made to, and if that host is the server's address
+(otherwise a foreign host name that resolves to this machine would pass: DNS rebinding).
 """
 
 from __future__ import annotations
@@ -24,18 +23,18 @@ _HERE = ("127.0.0.1", "localhost", "::1")
 
 @dataclass(frozen=True)
 class RequestGuard:
-    """Says which requests are answered.
+    """Decides which requests are answered.
 
     Attributes:
-        host: The address that is listened on.
-        token: What pages must bring along, in the address or as the cookie they then get; None for nothing.
+        host: The address that the server listens on.
+        token: Token that pages must send, in the address or as the cookie they then get; None: no token needed.
     """
 
     host: str
     token: str | None = None
 
     def refuses(self, path: str, headers: Mapping[str, str]) -> str | None:
-        """Why a request for this path with these headers is refused; None where it is not."""
+        """Reason to refuse a request for this path with these headers; None to accept it."""
         host = headers.get("Host", "")
         if not self._is_mine(host):
             return "this server is not called so"
@@ -50,7 +49,7 @@ class RequestGuard:
         return None
 
     def cookie(self, path: str) -> str | None:
-        """Header that lets a page which brought the token in its address connect; None where it did not."""
+        """Value of the cookie header for a page with the token in its address; None for other pages."""
         if self.token is None or not _same(_token_in(path), self.token):
             return None
         return f"{_COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
@@ -62,7 +61,7 @@ class RequestGuard:
             return False
         if self.host in _HERE:
             return name in _HERE
-        # on all interfaces this machine has more names than it knows: the token decides
+        # listening on all interfaces, the machine has names it does not know: the token decides
         return self.host in ("0.0.0.0", "::") or name == self.host.lower()
 
     def _knows(self, path: str, headers: Mapping[str, str]) -> bool:
@@ -86,8 +85,10 @@ def _same(given: str, token: str) -> bool:
 
 @contextmanager
 def guarding(guard: RequestGuard) -> Iterator[None]:
-    """A server of viser's that is made inside asks this guard first: viser has no place of its own for that, so what it
-    hands to ``websockets`` is changed on the way."""
+    """Context in which a viser server that is created asks this guard first.
+
+    viser has no hook for this, so the handler that it passes to ``websockets`` is wrapped.
+    """
     import websockets.asyncio.server as websockets_server
 
     original = websockets_server.serve
@@ -104,7 +105,7 @@ def guarding(guard: RequestGuard) -> Iterator[None]:
 
 
 def _first(guard: RequestGuard, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-    """A handler of requests that lets the guard look at them first."""
+    """Request handler that asks the guard before ``answer``."""
 
     def process(connection: Any, request: Any) -> Any:
         reason = guard.refuses(request.path, request.headers)

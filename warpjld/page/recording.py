@@ -1,4 +1,4 @@
-"""A page that plays an animation by itself: one HTML file, turned with the mouse, without a server."""
+"""Recording of an animation as one self-contained, interactive HTML file."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from warpjld.page.server import add_colored, add_surface, guarded_server, look, 
 __all__ = ["PageRecording"]
 
 _GRAIN = 2.0**-17
-"""Places are kept to this [m], 8 µm: their last bits, which nobody sees, would make the file twice as large."""
+"""Resolution of positions [m], 8 µm; invisible, and it halves the size of the compressed file."""
 
 
 class PageRecording:
-    """Surfaces frame after frame; the file is written when the ``with`` statement ends, whole or not at all.
+    """Context manager that records surfaces frame by frame; the file is written atomically at the end.
 
     Args:
         path: The file.
-        rate: Frames a second.
+        rate: Frames per second.
 
     Raises:
         InputError: On leaving: no frame was taken, or the file cannot be written.
@@ -40,7 +40,7 @@ class PageRecording:
         self._recorder: Any = None
 
     def __enter__(self) -> Self:
-        # the recorder is a part of viser's server: one that answers nobody
+        # viser's recorder is part of its server: start one that refuses all requests
         nobody = RequestGuard("127.0.0.1", secrets.token_urlsafe(24))
         self._server = guarded_server(nobody, 0, f"the page '{self.path.name}'")
         return self
@@ -54,7 +54,7 @@ class PageRecording:
         *,
         wireframe: bool = False,
     ) -> None:
-        """A surface of one colour at this frame: vertices (V, 3) [m], triangles (T, 3), the same at every frame."""
+        """Add a surface of one colour to this frame: vertices (V, 3) [m]; triangles (T, 3), the same in every frame."""
         places = _grained(vertices)
         if name not in self._meshes:
             self._meshes[name] = add_surface(self._server, f"/{name}", places, faces, color, wireframe=wireframe)
@@ -65,14 +65,14 @@ class PageRecording:
     def colored(
         self, name: str, vertices: NDArray[np.floating], faces: NDArray[np.int32], colors: NDArray[np.uint8]
     ) -> None:
-        """A surface with colours of its vertices (V, 3) at this frame."""
+        """Add a surface with vertex colours (V, 3) to this frame."""
         places, old = _grained(vertices), self._drawn.get(name)
         if old is None or old[1] is None or not (np.array_equal(old[0], places) and np.array_equal(old[1], colors)):
             add_colored(self._server, f"/{name}", places, faces, colors)
         self._drawn[name] = places, colors
 
     def step(self) -> None:
-        """The frame is complete."""
+        """Finish the frame."""
         if self._recorder is None:
             look(self._server, np.concatenate([places for places, _ in self._drawn.values()]))
             self._recorder = self._server.get_scene_serializer()
@@ -84,7 +84,7 @@ class PageRecording:
         try:
             if kind is None:
                 if self._recorder is None:
-                    raise InputError("a page wants at least one frame", path=self.path)
+                    raise InputError("a page needs at least one frame", path=self.path)
                 page = self._recorder.as_html()
                 with whole_file(self.path) as part:
                     part.write_text(page, encoding="utf-8")

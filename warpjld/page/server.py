@@ -1,4 +1,4 @@
-"""A server of pages that nobody else drives, quiet, with a stage that is lit."""
+"""viser server with access control, without console output, and with scene lighting; adding surfaces to it."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from warpjld.page.guard import RequestGuard, guarding
 __all__ = ["FIELD", "add_colored", "add_surface", "guarded_server", "look", "rgb", "stop"]
 
 FIELD = 0.6
-"""Vertical opening of the camera [rad]."""
+"""Vertical field of view of the camera [rad]."""
 
 
 def guarded_server(guard: RequestGuard, port: int, purpose: str) -> Any:
-    """viser's server on the guard's host, at a port or the next that is free (0: any), with an empty stage.
+    """viser server on the guard's host, at a port or the next free one (0: any), with an empty scene.
 
     Raises:
         MissingExtraError: viser is not installed.
@@ -30,9 +30,9 @@ def guarded_server(guard: RequestGuard, port: int, purpose: str) -> Any:
         from viser import _messages
     except ImportError:
         raise MissingExtraError(purpose, "studio") from None
-    with guarding(guard), redirect_stdout(StringIO()):  # it prints a table of addresses, without the token
+    with guarding(guard), redirect_stdout(StringIO()):  # viser prints its addresses, without the token
         server = viser.ViserServer(host=guard.host, port=port, verbose=False)
-    # viser's own button for this is hidden; a message that asks for a public tunnel must not open one either
+    # viser's button for a public tunnel is hidden; messages that ask for one must be ignored as well
     server._websock_server.unregister_handler(_messages.ShareUrlRequest)
     _light(server)
     server.scene.set_up_direction("+y")
@@ -43,7 +43,7 @@ def guarded_server(guard: RequestGuard, port: int, purpose: str) -> Any:
 
 
 def stop(server: Any) -> None:
-    """End it, without a word."""
+    """Stop the server without console output."""
     with redirect_stdout(StringIO()):
         server.stop()
 
@@ -58,7 +58,7 @@ def add_surface(
     wireframe: bool = False,
     opacity: float | None = None,
 ) -> Any:
-    """A surface of one colour, whose ``vertices`` may then be set."""
+    """Add a surface of one colour; its ``vertices`` can be changed later."""
     return server.scene.add_mesh_simple(
         name,
         vertices,
@@ -75,12 +75,12 @@ def add_surface(
 def add_colored(
     server: Any, name: str, vertices: NDArray[np.float32], faces: NDArray[np.int32], colors: NDArray[np.uint8]
 ) -> Any:
-    """A surface with colours of its vertices; adding it again replaces it."""
+    """Add a surface with vertex colours; adding it again replaces it."""
     return server.scene.add_glb(name, colored_glb(vertices, faces, colors), cast_shadow=False, receive_shadow=False)
 
 
 def look(server: Any, points: NDArray[np.floating], direction: tuple[float, float, float] = (0.45, 0.75, 0.5)) -> None:
-    """Set the camera of every window so that these points (n, 3) fill it, seen from a direction."""
+    """Set the camera of every window so that points (n, 3) fill the view from a direction."""
     low, high = points.min(axis=0), points.max(axis=0)
     centre = (low + high) / 2.0
     away = float(np.linalg.norm(high - low)) / 2.0 / np.tan(FIELD / 2.0) * 1.1

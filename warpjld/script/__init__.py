@@ -1,4 +1,4 @@
-"""The command language: scripts of key angles, read and run (A §9, R79–R88)."""
+"""The command language of scripts: parser, registry of commands, interpreter and scene (A §9, R79–R88)."""
 
 from warpjld.script.arguments import Arguments
 from warpjld.script.interpreter import Interpreter

@@ -1,4 +1,4 @@
-"""What a command function reads its arguments with: each reader says what it wants, and errors point at the word."""
+"""Typed readers for the arguments of a command; errors state what was expected, with line and column."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Arguments"]
 
-_MOST_KEYS = 10_000
-_LARGEST = 1e12  # of any number in a script, unless its argument says otherwise
+_MOST_KEYS = 10_000  # keys that one command may set
+_LARGEST = 1e12  # magnitude of the numbers in a script, unless the argument states a range
 
 
 class Arguments:
@@ -28,8 +28,8 @@ class Arguments:
 
     Attributes:
         command: The command called.
-        position: Where the call stands.
-        interpreter: Who runs it, for commands that run other commands.
+        position: Position of the call in the script.
+        interpreter: The interpreter that runs it, for commands that run other commands.
 
     Examples:
         >>> @wj.command("NUDGE", syntax="NUDGE <LEFT/RIGHT> <metres>", help="Say how far.")
@@ -58,7 +58,7 @@ class Arguments:
         self._end = end
 
     def __len__(self) -> int:
-        """How many arguments are left."""
+        """Number of arguments not read yet."""
         return len(self._values) - self._next
 
     def __bool__(self) -> bool:
@@ -66,11 +66,11 @@ class Arguments:
 
     @property
     def last(self) -> Position:
-        """Where the argument read last stands."""
+        """Position of the argument that was read last; of the command if none was."""
         return self._values[self._next - 1].position if self._next else self.position
 
     def error(self, message: str, position: Position | None = None) -> InputError:
-        """An error to be raised, at the argument read last unless told otherwise."""
+        """An error to be raised, located at the argument read last or at ``position``."""
         return (position or self.last).error(message)
 
     def expected(self, what: str, hint: str = "") -> InputError:
@@ -85,7 +85,11 @@ class Arguments:
         return f"the command is {self.command.syntax}"
 
     def finish(self) -> None:
-        """Raise where an argument is left over."""
+        """Check that no argument is left over.
+
+        Raises:
+            InputError: There is one.
+        """
         if self:
             raise self.expected("the end of the line")
 
@@ -99,9 +103,9 @@ class Arguments:
         maximum: float = _LARGEST,
         above: float = -math.inf,
     ) -> float:
-        """A number in [minimum, maximum] and greater than ``above``; ``what`` names it in errors.
+        """Read a number in [minimum, maximum] and greater than ``above``; ``what`` names it in errors.
 
-        Nothing is measured in numbers beyond 10¹², the modulus of diamond in pascals.
+        The default range reaches to 10¹², about the modulus of diamond in pascals, the largest quantity in scripts.
         """
         value = self._peek()
         if not isinstance(value, Number):
@@ -118,7 +122,7 @@ class Arguments:
         return value.value
 
     def integer(self, what: str, *, minimum: int | None = None, maximum: int | None = None) -> int:
-        """A whole number."""
+        """Read an integer."""
         low, high = (-_LARGEST if minimum is None else minimum), (_LARGEST if maximum is None else maximum)
         value = self.number(what, minimum=low, maximum=high)
         if value != round(value):
@@ -126,18 +130,19 @@ class Arguments:
         return round(value)
 
     def vector(self, what: str) -> tuple[float, float, float]:
-        """Three numbers."""
+        """Read three numbers."""
         x, y, z = (self.number(f"{what} {axis}", minimum=-LARGEST, maximum=LARGEST) for axis in "xyz")
         return x, y, z
 
     def has_number(self) -> bool:
-        """Whether a number comes next."""
+        """Whether the next argument is a number."""
         return isinstance(self._peek(), Number)
 
     def keys_and_value(self, what: str = "the value in degrees") -> tuple[list[float], float]:
-        """``<key1> <key2> <step> <value>``: the keys key1, key1 + step, … up to key2, and the value (C15).
+        """Read ``<key1> <key2> <step> <value>`` or ``AT <key> <value>`` (C15).
 
-        ``AT <key> <value>`` is a single key.
+        Returns:
+            Frames of the keys: key1, key1 + step, … up to key2, or the single key; and the value.
         """
         if self.keyword("AT"):
             return [self.number("the key (a frame)")], self.number(what)
@@ -154,7 +159,7 @@ class Arguments:
     # ---- words ---------------------------------------------------------------------------------------------------
 
     def keyword(self, *words: str) -> str | None:
-        """One of these keywords, in capitals, if it comes next; otherwise nothing is read."""
+        """Read one of these keywords, returned in capitals; None, and nothing is read, if another argument is next."""
         value = self._peek()
         if isinstance(value, Word) and value.text.upper() in words:
             self._next += 1
@@ -162,7 +167,7 @@ class Arguments:
         return None
 
     def choice(self, what: str, options: Iterable[str], beside: Iterable[str] = ()) -> str:
-        """One of these keywords, in capitals; ``beside`` are others that a slip of the pen may have meant."""
+        """Read one of these keywords, returned in capitals; ``beside`` are further words for spelling hints."""
         wanted = list(options)
         word = self.keyword(*wanted)
         if word is None:
@@ -172,7 +177,7 @@ class Arguments:
         return word
 
     def choices(self, *groups: Sequence[str]) -> list[str]:
-        """One keyword of every group, in whatever order they stand; in the groups' order, in capitals."""
+        """Read one keyword of every group, in any order; returned in the groups' order, in capitals."""
         found: dict[int, str] = {}
         while len(found) < len(groups):
             missing = [g for g in range(len(groups)) if g not in found]
@@ -186,9 +191,11 @@ class Arguments:
         return [found[g] for g in range(len(groups))]
 
     def options(self, *beside: str, **readers: Callable[[], object]) -> dict[str, object]:
-        """Named options ``NAME value …`` in any order up to the end of the line: name in lower case → value.
+        """Read named options ``NAME value …`` in any order up to the end of the line: name in lower case → value.
 
-        ``beside`` are words that could have stood before them, for hints.
+        Args:
+            beside: Words that are allowed before the options, for spelling hints in errors.
+            readers: Function that reads the value of each option, by its name in lower case.
         """
         out: dict[str, object] = {}
         while self:
@@ -199,7 +206,7 @@ class Arguments:
         return out
 
     def text(self, what: str) -> str:
-        """A quoted text."""
+        """Read a quoted text."""
         value = self._peek()
         if not isinstance(value, Text):
             raise self.expected(f"{what} in quotes")
@@ -207,7 +214,7 @@ class Arguments:
         return value.text
 
     def name(self, what: str) -> str:
-        """A word, or a quoted text where it holds blanks or signs."""
+        """Read a name: a word, or a quoted text (needed where it contains blanks or signs)."""
         value = self._peek()
         if not isinstance(value, Word | Text):
             raise self.expected(what)
@@ -215,7 +222,7 @@ class Arguments:
         return value.text
 
     def new_name(self, what: str) -> str:
-        """As ``name``, for what is to be called so: files carry it too."""
+        """Read the name of something new; as ``name``, but it must also be usable as a file name."""
         name = self.name(what)
         try:
             return check_name(name, what)
@@ -223,11 +230,11 @@ class Arguments:
             raise self.error(error.message) from None
 
     def has_text(self) -> bool:
-        """Whether a quoted text comes next."""
+        """Whether the next argument is a quoted text."""
         return isinstance(self._peek(), Text)
 
     def anything(self) -> Value:
-        """The next argument, whatever it is."""
+        """Read the next argument, of any kind."""
         value = self._peek()
         if value is None:
             raise self.expected("an argument")
@@ -237,7 +244,7 @@ class Arguments:
     # ---- files ---------------------------------------------------------------------------------------------------
 
     def input_file(self, what: str) -> Path:
-        """A quoted name of a file that exists; relative to the script's folder (at a prompt, to the current one)."""
+        """Read a quoted name of an existing file, relative to the script's folder (at a prompt, to the current one)."""
         name = self.text(what)
         if "\0" in name:
             raise self.error(f"{name!r}: no file has a zero byte in its name")
@@ -255,7 +262,7 @@ class Arguments:
         return path
 
     def output_name(self, what: str, suffixes: Sequence[str]) -> str:
-        """A quoted name of a file to make inside the output folder, with one of these suffixes."""
+        """Read a quoted name of a file to be written into the output folder, with one of these suffixes."""
         name = self.text(what)
         path = Path(name)
         if path.is_absolute() or ".." in path.parts or not path.name:

@@ -1,4 +1,4 @@
-"""An actor's surface bound to its skeleton; bound once, as long as nothing that matters changes."""
+"""Binding of an actor's surface to its skeleton, reused until skeleton, method or domains change."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["cover"]
 
 
 def cover(actor: Actor) -> Covering:
-    """The covering of an actor with its parameters, method and domains."""
+    """Covering of an actor with its present parameters, method and domains."""
     from warpjld.covering.kept import bind_kept
 
     old = actor.covering

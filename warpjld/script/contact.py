@@ -1,4 +1,4 @@
-"""Contact of a scene: it is handed to the simulation as a specification and an animation; keys and files come of it."""
+"""Contact simulation of a scene: its specification and animation in, keys of digits and output files back."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 __all__ = ["REST", "SceneAnimation", "check_contact", "run_contact", "write_contact", "write_keys"]
 
 REST = SplineConstants(tension=1.0)
-"""A key at which a joint rests: what follows it does not change what leads to it."""
+"""Spline constants of a key with zero slope, so that later keys do not change the curve before it."""
 
-_THROUGH = SplineConstants()
+_THROUGH = SplineConstants()  # of a key that the curve passes smoothly
 
 
 def run_contact(
@@ -48,7 +48,13 @@ def run_contact(
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     keeping: Callable[[Keep], None] = lambda keep: None,
 ) -> Simulation:
-    """Do what ``PRESS`` asks for; grips that are found, and angles that are corrected, become keys of their actors.
+    """Run the simulation that ``PRESS`` specifies; grips found and angles corrected become keys of the actors.
+
+    Args:
+        scene: The scene.
+        folder: Output folder, for the state file.
+        progress: Called with a stage's name, steps done and total.
+        keeping: Called with a function that saves the state, see ``simulate``.
 
     Raises:
         InputError: Bodies that cannot be meshed or driven; names the command's line.
@@ -72,7 +78,7 @@ def run_contact(
 
 @dataclass(frozen=True, eq=False)
 class _StagedActor:
-    """An actor as the simulation asks for it (see ``ActorAnimation``)."""
+    """An actor of the scene as ``ActorAnimation`` of the simulation."""
 
     actor: Actor
     rate: float
@@ -121,7 +127,7 @@ class _StagedActor:
 
 @dataclass(frozen=True, eq=False)
 class _StagedObject:
-    """An object as the simulation asks for it (see ``ObjectAnimation``)."""
+    """An object of the scene as ``ObjectAnimation`` of the simulation."""
 
     prop: Prop
     actors: Mapping[str, Actor]
@@ -153,7 +159,7 @@ class _StagedObject:
 
 
 class SceneAnimation:
-    """A scene as the simulation asks for it (see ``Animation``)."""
+    """A scene as ``Animation`` of the simulation."""
 
     def __init__(self, scene: Scene, edited: Mapping[str, _StagedActor] | None = None) -> None:
         self._scene = scene
@@ -162,28 +168,28 @@ class SceneAnimation:
 
     @cached_property
     def objects(self) -> dict[str, _StagedObject]:
-        """In their order on the stage."""
+        """Objects by name, in the order they were added."""
         actors = {name: staged.actor for name, staged in self.actors.items()}
         return {name: _StagedObject(prop, actors, self._scene.rate) for name, prop in self._scene.props.items()}
 
     def edited(self, edits: Sequence[AngleEdit]) -> SceneAnimation:
-        """The same with keys set in copies of its actors; objects that follow none of them stay the same."""
-        mine = {edit.actor: [one for one in edits if one.actor == edit.actor] for edit in edits}
-        actors = {name: self.actors[name].edited(some) for name, some in mine.items()}
+        """Copy with edits applied to copies of the actors; objects attached to none of these are shared."""
+        by_actor = {edit.actor: [other for other in edits if other.actor == edit.actor] for edit in edits}
+        actors = {name: self.actors[name].edited(own) for name, own in by_actor.items()}
         out = SceneAnimation(self._scene, self.actors | actors)
-        for name, one in self.objects.items():
-            if not one.follows & set(actors):
-                out.objects[name] = one
+        for name, staged in self.objects.items():
+            if not staged.follows & set(actors):
+                out.objects[name] = staged
         return out
 
 
 def write_keys(actor: Actor, edit: AngleEdit) -> None:
-    """Set the keys of an edit: what is kept before it is kept by a key at every frame."""
+    """Set the keys of an edit; the curve before it is preserved by a key at every frame."""
     channel = f"{actor.skeleton.names[edit.joint]}.{CHANNELS[FLEXION]}"
     track = actor.motion.tracks[channel]
     if edit.frame is None:
         later = sorted((key for key in track.keys if key.frame > edit.kept), key=lambda key: key.frame)
-        for key in later:  # the angle that the first of them holds may be more than a digit that stopped has come to
+        for key in later:  # a digit that stopped may not have reached the angle that later keys hold
             if key.value == later[0].value:
                 track.set(replace(key, value=edit.value))
         return
@@ -196,12 +202,18 @@ def write_keys(actor: Actor, edit: AngleEdit) -> None:
 
 
 def check_contact(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.float64]) -> list[str]:
-    """Raise where something is asked for that only PRESS gives, at frames it does not solve; notes on the others.
+    """Check that contact is solved for every output that shows it.
 
     Args:
-        scene: What the script described.
+        scene: The scene.
         outputs: Files to make.
         frames: Frames to make, shape (F,).
+
+    Returns:
+        Notes for the user.
+
+    Raises:
+        InputError: An output needs ``PRESS``, or a frame that ``PRESS`` does not solve, or flesh that no actor has.
     """
     pressing = scene.contact.pressing
     span = "" if pressing is None else f"PRESS solves frames {pressing.first} to {pressing.last}"
@@ -228,7 +240,7 @@ def check_contact(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.fl
 
 
 def write_contact(found: Simulation, outputs: Sequence[Output], out: OutputFolder) -> None:
-    """Tables and volumes."""
+    """Write tables, grips, tactile signals and volumes of a simulation into the output folder."""
     from warpjld.simulation.grip.find import write_grips
     from warpjld.simulation.report.table import write_table
     from warpjld.simulation.report.volume_series import write_volumes

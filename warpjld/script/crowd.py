@@ -1,4 +1,4 @@
-"""All actors of a scene as one thing to draw, and cameras that show them all through all frames."""
+"""All actors and objects of a scene as one drawable, and cameras that frame them over all frames."""
 
 from __future__ import annotations
 
@@ -30,13 +30,20 @@ if TYPE_CHECKING:
 
 __all__ = ["Crowd", "Role", "role_of"]
 
-_TOGETHER = 512  # frames whose points a camera is shown at once: of more frames only the outermost points are kept
-_SAMPLES = 12  # frames whose surface a camera is made to show; the joints of all frames count as well
+_TOGETHER = 512  # frames per block when framing; of each block only the points of the convex hull are kept
+_SAMPLES = 12  # frames whose whole surface is framed, beside the joints of all frames
 
 
 @dataclass(frozen=True, eq=False)
 class Role:
-    """An actor with its surface bound, and its poses at the frames to make."""
+    """An actor with its covering and its poses at the frames to make.
+
+    Attributes:
+        actor: The actor.
+        covering: Its covering.
+        poses: Its poses at the frames.
+        contact: Contact of its skin for display, where TOUCH is on.
+    """
 
     actor: Actor
     covering: Covering
@@ -44,12 +51,12 @@ class Role:
     contact: SkinContact | None = None
 
     def limited(self, poses: Poses, first: int) -> Poses:
-        """Poses of this role, whose digits close only until they touch where TOUCH LIMIT says so."""
+        """Poses of this role, with digits stopped at contact where TOUCH LIMIT is set."""
         return poses if self.contact is None else self.contact.poses(poses, first=first)
 
 
 def role_of(actor: Actor, frames: NDArray[np.float64], rate: float) -> Role:
-    """An actor bound and posed at these frames of a scene with that rate [1/s]."""
+    """Bind an actor and pose it at frames (F,) of a scene with a rate [1/s]."""
     from warpjld.script.binding import cover
 
     role = Role(actor, cover(actor), staged(actor, frames, rate))
@@ -63,15 +70,15 @@ def role_of(actor: Actor, frames: NDArray[np.float64], rate: float) -> Role:
 
 @dataclass(frozen=True, eq=False)
 class Crowd:
-    """The roles of a scene, their vertices, faces, joints and segments put one after another.
+    """The roles of a scene, with their vertices, faces, joints and segments concatenated.
 
     Attributes:
         roles: In the order of the scene's actors.
         frames: Frame numbers of their poses, shape (F,).
         device: Warp device of the covering.
-        props: Objects on the stage.
-        whereabouts: Places of an object at some frames.
-        pressed: What contact makes of skin and objects, where it was solved.
+        props: The scene's objects.
+        whereabouts: Function that gives the placements of an object at frames.
+        pressed: Deformed surfaces from the contact simulation, where there was one.
     """
 
     roles: Sequence[Role]
@@ -83,14 +90,14 @@ class Crowd:
 
     @cached_property
     def faces(self) -> NDArray[np.int32]:
-        """Triangles over the vertices of all, shape (T, 3)."""
+        """Triangles over the concatenated vertices, shape (T, 3)."""
         counts = np.cumsum([0, *(len(r.covering.surface.vertices) for r in self.roles)])
         faces = [r.covering.surface.faces + start for r, start in zip(self.roles, counts, strict=False)]
         return np.concatenate([np.empty((0, 3), np.int32), *faces]).astype(np.int32)
 
     @cached_property
     def segments(self) -> NDArray[np.int32]:
-        """Bones over the joints of all, shape (B, 2)."""
+        """Segments over the concatenated joints, shape (B, 2)."""
         counts = np.cumsum([0, *(len(r.covering.skeleton) for r in self.roles)])
         pairs = [
             (segment.proximal + start, segment.distal + start)
@@ -100,7 +107,7 @@ class Crowd:
         return np.array(pairs, dtype=np.int32).reshape(-1, 2)
 
     def at(self, frame: float, rate: float) -> Crowd:
-        """The same roles at one frame, whole or not, of a scene with that rate [1/s]."""
+        """The same roles at one frame (fractions allowed) of a scene with a rate [1/s]."""
         moment = np.array([frame])
         roles = [
             replace(role, poses=role.limited(stage(role.actor, moment, rate), round(frame))) for role in self.roles
@@ -109,12 +116,12 @@ class Crowd:
 
     @cached_property
     def places(self) -> list[Places]:
-        """Places of every object at the frames."""
+        """Placements of every object at the frames."""
         assert self.whereabouts is not None or not self.props
         return [self.whereabouts(prop, self.frames) for prop in self.props if self.whereabouts]
 
     def solids(self, shift: NDArray[np.float64] | float = 0.0) -> list[Solid]:
-        """The objects as they are drawn, at the first frame, less a shift [m]."""
+        """The objects as drawables, at the first frame, translated by ``-shift`` [m]."""
         from warpjld.render import Solid
 
         return [
@@ -123,7 +130,7 @@ class Crowd:
         ]
 
     def moved_solids(self, frame: int, shift: NDArray[np.float64] | float = 0.0) -> list[NDArray[np.float64] | None]:
-        """As ``solid_vertices``; None for objects that are where they were a frame before."""
+        """As ``solid_vertices``; None for objects that have not moved since the previous frame."""
         if np.any(shift) or frame == 0:
             return [*self.solid_vertices(frame, shift)]
         return [
@@ -132,18 +139,18 @@ class Crowd:
         ]
 
     def solid_vertices(self, frame: int, shift: NDArray[np.float64] | float = 0.0) -> list[NDArray[np.float64]]:
-        """Vertices of every object at the frame of that place in the sequence, less a shift [m]."""
+        """Vertices of every object at the ``frame``-th of the frames, translated by ``-shift`` [m]."""
         pairs = zip(self.props, self.places, strict=True)
         return [self.prop_vertices(prop, places, frame) - shift for prop, places in pairs]
 
     def prop_vertices(self, prop: Prop, places: Places, frame: int) -> NDArray[np.float64]:
-        """Vertices of an object at the frame of that place in the sequence [m], shape (n, 3)."""
+        """Vertices of an object at the ``frame``-th of the frames [m], shape (n, 3)."""
         if self.pressed is not None and (found := self.pressed.object(prop.name, self.frames[frame])) is not None:
             return found
         return places[frame].apply(prop.shape(float(self.frames[frame])))[0]
 
     def _stays(self, prop: Prop, places: Places, frame: int) -> bool:
-        """Whether an object is as it was a frame before."""
+        """Whether an object has not changed since the previous frame."""
         pressed = self.pressed is not None and self.pressed.moves(prop.name)
         still = np.array_equal(places.position[frame], places.position[frame - 1]) and np.array_equal(
             places.rotation[frame], places.rotation[frame - 1]
@@ -151,19 +158,27 @@ class Crowd:
         return still and not prop.deforms and not pressed
 
     def joints(self, frame: int) -> NDArray[np.float64]:
-        """Joint positions of all at the frame of that place in the sequence [m], shape (J, 3)."""
+        """Concatenated joint positions at the ``frame``-th of the frames [m], shape (J, 3)."""
         each = (role.poses[frame : frame + 1].positions[0] for role in self.roles)
         return np.concatenate([np.empty((0, 3)), *each])
 
     def surface(self, frame: int) -> NDArray[np.float32]:
-        """Vertices of all at one frame [m], shape (V, 3)."""
-        some = slice(frame, frame + 1)
-        skins = [self.worn(r, r.covering.deform(r.poses[some], device=self.device), frame)[0] for r in self.roles]
+        """Concatenated vertices at the ``frame``-th of the frames [m], shape (V, 3)."""
+        here = slice(frame, frame + 1)
+        skins = [self.worn(r, r.covering.deform(r.poses[here], device=self.device), frame)[0] for r in self.roles]
         return np.concatenate([np.empty((0, 3), np.float32), *skins])
 
     def worn(self, role: Role, vertices: NDArray[np.float32], start: int) -> NDArray[np.float32]:
-        """Surfaces of a role (n, V, 3) from the frame of that place on: where TOUCH is on what crosses is parted and
-        what is inside rigid objects flattened on them; where contact was solved the skin is as it found it."""
+        """Surfaces of a role as displayed, for n frames from the ``start``-th on.
+
+        Where TOUCH is on, skin is separated from other skin and pushed out of rigid objects; where contact was solved,
+        its deformed skin replaces the covering's.
+
+        Args:
+            role: The role.
+            vertices: Surfaces from the covering [m], shape (n, V, 3).
+            start: Index of the first of their frames.
+        """
         if role.contact is not None and len(vertices):
             poses = role.poses[start : start + len(vertices)]
             first = round(float(self.frames[start]))
@@ -183,7 +198,7 @@ class Crowd:
         return out
 
     def shift(self, camera: CameraSetting, frame: int) -> NDArray[np.float64]:
-        """What to take off all positions at the frame of that place so that the camera goes along [m], shape (3,)."""
+        """Translation to subtract from all positions so that the camera follows the first actor [m], shape (3,)."""
         if not camera.follow or not self.roles:
             return np.zeros(3)
         first = self.roles[0]
@@ -191,7 +206,7 @@ class Crowd:
 
     @cached_property
     def colors(self) -> NDArray[np.uint8] | None:
-        """Colours of the vertices of all, shape (V, 3); None where all actors have the usual one."""
+        """Colours of the concatenated vertices, shape (V, 3); None where all actors have the default colour."""
         from PIL import ImageColor
 
         if all(role.actor.color is None for role in self.roles):
@@ -204,8 +219,10 @@ class Crowd:
         return np.concatenate(rows).astype(np.uint8)
 
     def camera(self, camera: CameraSetting, size: tuple[int, int], frame: float | None = None) -> RenderCamera:
-        """A camera where it is at a frame, at the first one if left out; a named view is framed for all frames, so that
-        nothing leaves the picture."""
+        """Render camera of a setting at a frame (the first one if left out).
+
+        A named view is framed for all frames, so that nothing leaves the picture.
+        """
         from warpjld.render import Camera as RenderCamera
 
         camera = camera_at(camera, float(self.frames[0]) if frame is None else frame)
@@ -225,18 +242,18 @@ class Crowd:
 
     @property
     def default_view(self) -> str:
-        """Where to look from where no CAMERA was chosen."""
+        """Name of the view where no CAMERA was chosen."""
         return "three-quarter" if self._facing[2] else "front"
 
     def _framing(self, camera: CameraSetting) -> NDArray[np.float64]:
-        """Points that must be in every picture [m], shape (n, 3)."""
+        """Points that must be visible in every frame [m], shape (n, 3)."""
         surfaces = [points - self.shift(camera, frame) for frame, points in self._samples.items()]
         spans = [(start, min(start + _TOGETHER, len(self.frames))) for start in range(0, len(self.frames), _TOGETHER)]
         shown = [self._shown(camera, *span) for span in spans]
         return np.concatenate([*surfaces, *(shown if len(shown) < 2 else map(outermost, shown))])
 
     def _shown(self, camera: CameraSetting, first: int, stop: int) -> NDArray[np.float64]:
-        """Joints and vertices of objects at some frames, less what the camera goes along [m], shape (n, 3)."""
+        """Joints and vertices of objects at a range of frames, relative to the following camera [m], shape (n, 3)."""
         shifts = np.stack([self.shift(camera, frame) for frame in range(first, stop)])
         joints = [(role.poses[first:stop].positions - shifts[:, None]).reshape(-1, 3) for role in self.roles]
         frames = range(first, stop) if self.props else ()
@@ -251,7 +268,7 @@ class Crowd:
 
     @cached_property
     def _facing(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Literal["left", "right"] | None]:
-        """Where a lone hand's palm looks, what is up for it, and its side; the stage's own axes for anything else."""
+        """Palm normal, up direction and side of a single hand; world axes and None for anything else."""
         skeleton = self.roles[0].covering.skeleton if self.roles else None
         side = hand_side(skeleton) if skeleton is not None and len(self.roles) == 1 else None
         if skeleton is None or side is None:
@@ -264,7 +281,7 @@ class Crowd:
 
 
 def hand_side(skeleton: Skeleton) -> Literal["left", "right"] | None:
-    """The side of a skeleton that is a single hand."""
+    """Side of a skeleton that is a single hand, else None."""
     sides: tuple[Literal["left", "right"], ...] = ("left", "right")
     found = [side for side in sides if f"{side}.middle.base" in skeleton.names]
     alone = len(found) == 1 and f"{found[0]}.wrist" in skeleton.names and len(skeleton) <= 40

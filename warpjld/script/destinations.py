@@ -1,4 +1,4 @@
-"""Where files are to go, looked at before anything is computed: places, permissions, free space."""
+"""Checks of output destinations before anything is computed: existing folders, permissions, free space."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ __all__ = ["check_destinations"]
 
 
 def check_destinations(folder: Path, names: Iterable[str], size: float = 0.0) -> None:
-    """Make sure that files can be written into a folder, which need not be there yet.
+    """Check that files can be written into a folder, which need not exist yet.
 
     Args:
         folder: The folder.
         names: Files, relative to it.
-        size: About how many bytes all of them are.
+        size: Estimated size of all files [bytes].
 
     Raises:
         InputError: A folder or a file is in the way, the folder cannot be written into, or the disk has less room.

@@ -1,4 +1,4 @@
-"""The director's part of a scene over time: where cameras are, how lamps shine, which shot has a frame (R135)."""
+"""Key-framed cameras and lamps, and the shot of a frame (R135)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["KeyedLamp", "camera_at", "shot_at"]
 
 
 def camera_at(camera: CameraSetting, frame: float) -> CameraSetting:
-    """A camera where its keys have it at a frame, on splines as angles are; as it is where it has none."""
+    """A camera setting at a frame, interpolated between its keys by splines; unchanged without keys."""
     if not camera.keys:
         return camera
 
@@ -41,18 +41,18 @@ def camera_at(camera: CameraSetting, frame: float) -> CameraSetting:
 
 
 def shot_at(shots: Sequence[Shot], frame: float) -> Shot | None:
-    """The shot that a frame belongs to."""
+    """The shot that a frame belongs to, or None."""
     return next((shot for shot in shots if shot.first <= frame <= shot.last), None)
 
 
 @dataclass(eq=False)
 class KeyedLamp:
-    """A lamp over time.
+    """A lamp with key-framed position, target and intensity.
 
     Attributes:
         color: ``#rrggbb``.
-        parallel: Whether it shines in one direction everywhere.
-        tracks: Keys of its place ``px py pz``, its target ``tx ty tz`` and its ``intensity``.
+        parallel: Whether it is directional (parallel rays) rather than a point light.
+        tracks: Keys of its position ``px py pz`` [m], its target ``tx ty tz`` [m] and its ``intensity``.
     """
 
     color: str
@@ -65,7 +65,7 @@ class KeyedLamp:
             self.tracks.setdefault(channel, Track(channel)).set(Key(frame, value, *spline))
 
     def at(self, frame: float) -> Lamp:
-        """How it shines at a frame."""
+        """The lamp at a frame."""
         px, py, pz, tx, ty, tz, intensity = (
             float(self.tracks[channel].spline(frame)) for channel in ("px", "py", "pz", "tx", "ty", "tz", "intensity")
         )

@@ -1,4 +1,4 @@
-"""Vertices and facets by the numbers that the files have, which people count by (R133)."""
+"""Vertices and facets by their numbers in the files (R133)."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ __all__ = ["Facet", "read_facet", "read_vertex"]
 
 @dataclass(frozen=True, eq=False)
 class Facet:
-    """A facet of an object by its number in the file, and the triangles that it is made of."""
+    """A facet of an object: its number in the file, and the rows of its triangles."""
 
     number: int
     triangles: NDArray[np.int64]
 
     def coordinates(self, point: NDArray[np.floating], thing: GraspObject) -> tuple[NDArray[np.float64], bool]:
-        """A point on the stage in the facet's basis [m], shape (3,), and whether its foot lies in the facet (C19)."""
+        """A world point in the facet's basis [m], shape (3,), and whether its foot lies in the facet (C19)."""
         from warpjld.grasp import facet_distance
 
         found = [facet_distance(point[None], thing, int(triangle)) for triangle in self.triangles]
-        return found[0].coordinates[0], any(bool(one.inside[0]) for one in found)
+        return found[0].coordinates[0], any(bool(each.inside[0]) for each in found)
 
 
 def read_vertex(actor: Actor, arguments: Arguments, what: str) -> int:
-    """Read the number of a vertex as the actor's file counts them; the welded vertex that it is."""
+    """Read a vertex number of the actor's file; the index of the welded vertex."""
     weld = actor.rig.surface.weld
     return int(weld[arguments.integer(what, minimum=0, maximum=len(weld) - 1)])
 
 
 def read_facet(prop: Prop, arguments: Arguments, what: str) -> Facet:
-    """Read the number of a facet as the object's file counts them."""
+    """Read a facet number of the object's file; the facet."""
     number = arguments.integer(what, minimum=0)
     try:
         return Facet(number, prop.thing.triangles_of(number))

@@ -1,4 +1,4 @@
-"""Outputs that fail while others go on: what was computed is not lost to one file that cannot be written."""
+"""Isolation of failing outputs: a file that cannot be written does not end the others."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from warpjld.errors import InputError, WarpjldError
 
 __all__ = ["Failures", "Writer"]
 
-_FORESEEN = (WarpjldError, OSError, MemoryError)
+_FORESEEN = (WarpjldError, OSError, MemoryError)  # errors that end one output only; others are bugs
 _T = TypeVar("_T")
 
 
 class Failures:
-    """Names of the outputs that could not be made, and why."""
+    """Collects the outputs that could not be made: message by name (``found``)."""
 
     def __init__(self) -> None:
         self.found: dict[str, str] = {}
 
     @contextmanager
     def kept(self, name: str, place: Path) -> Iterator[None]:
-        """While an output is made: if that fails it is noted, and whatever lies at its place for now is removed."""
+        """Context in which an output is made; an expected error is noted and the partial file removed."""
         try:
             yield
         except _FORESEEN as error:
             self.note(name, place, error)
 
     def note(self, name: str, place: Path, error: BaseException) -> None:
-        """Note why an output could not be made."""
-        # its place for now is no one's concern
+        """Note the error of an output and remove the partial file ``place``."""
+        # the temporary path must not appear in the message
         message = error.message if isinstance(error, InputError) and error.path == place else str(error)
         if isinstance(error, OSError):
             message = error.strerror or str(error)
@@ -41,12 +41,19 @@ class Failures:
             place.unlink(missing_ok=True)
 
     def lines(self) -> list[str]:
-        """One line an output."""
+        """One line per failed output."""
         return [f"'{name}': {message}" for name, message in self.found.items()]
 
 
 class Writer(Generic[_T]):
-    """A context manager that writes a file, whose failure is noted and ends nothing else."""
+    """Context manager around a file writer, whose failure is noted instead of raised.
+
+    Args:
+        name: Name of the output.
+        place: Temporary path.
+        make: Makes the writer, a context manager.
+        failures: Where failures are noted.
+    """
 
     def __init__(
         self, name: str, place: Path, make: Callable[[], AbstractContextManager[_T]], failures: Failures
@@ -65,7 +72,7 @@ class Writer(Generic[_T]):
         return self
 
     def do(self, work: Callable[[_T], object]) -> None:
-        """Let it write, unless it has failed."""
+        """Call ``work`` with the writer, unless it has failed."""
         if self._manager is None or self._writer is None:
             return
         try:

@@ -1,4 +1,4 @@
-"""The output folder: files are made in a hidden folder inside it and moved into place when all of them are done."""
+"""Transactional output folder: files are made in a hidden subfolder and moved into place when all are done."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from warpjld.files.whole_file import machine, process_runs
 __all__ = ["OutputFolder"]
 
 
-_LEFT = re.compile(rf"\.making([0-9]+)-{machine()}-.*")
+_LEFT = re.compile(rf"\.making([0-9]+)-{machine()}-.*")  # hidden folder of a process on this machine, with its id
 
 
 class OutputFolder:
-    """Use it in a ``with`` statement: a statement left by an error or Ctrl-C leaves the folder as it was.
+    """Context manager of an output folder; an error or Ctrl-C inside leaves the folder unchanged.
 
     Args:
         path: The folder; it is made if missing.
 
     Attributes:
         path: The folder.
-        work: The hidden folder.
+        work: The hidden subfolder, while the context is active.
 
     Raises:
         InputError: It cannot be made or written to, or a folder stands where a file should go.
@@ -52,7 +52,7 @@ class OutputFolder:
         return self
 
     def place(self, name: str | Path) -> Path:
-        """Where to make a file that is to be called ``name``."""
+        """Temporary path of the file that will be called ``name``."""
         if (self.path / name).is_dir():
             raise InputError("a folder stands where this file should go", path=self.path / name)
         path = self.work / name
@@ -93,7 +93,7 @@ class OutputFolder:
         remove_former(published)
 
     def _remove_made(self) -> None:
-        """Take away the folders that were made for nothing."""
+        """Remove the folders that were created, if they are empty."""
         for path in self._made:
             try:
                 path.rmdir()

@@ -1,4 +1,4 @@
-"""Names of files and views that scripts may ask for, and whether they can be made here: known before any work."""
+"""File suffixes and views that scripts may use, and a check that the packages they need are installed."""
 
 from __future__ import annotations
 

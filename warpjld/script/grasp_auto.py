@@ -1,4 +1,4 @@
-"""GRASP … AUTO: a grasp is found, and becomes the keys of the hand and of its joints (A §10, R90)."""
+"""GRASP … AUTO: finds a grasp and sets the keys of the hand and of its joints (A §10, R90)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
     from warpjld.covering import Covering
     from warpjld.grasp import GraspObject
-    from warpjld.grasp.auto import AutoGrasp
     from warpjld.grasp.close import Closer
+    from warpjld.grasp.find_grasp import AutoGrasp
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
 __all__ = ["carry", "grasp_by_itself", "key_grip"]
 
 _BEFORE = 0.6
-"""Part of the arm's way after which the open hand is before the object; then it comes straight."""
+"""Fraction of the arm's motion after which the open hand is in front of the object; the rest is straight."""
 
 
 def grasp_by_itself(
@@ -33,14 +33,14 @@ def grasp_by_itself(
 ) -> Attempt:
     """Find a grasp, and set keys: the open hand away from the object at ``first``, on it half-way, closed at ``last``.
 
-    A hand alone is moved as a whole; of a body the arm guides it, from where it is at ``first``, and the body stays.
-    The other objects are obstacles where they are at ``last``.
+    A single hand is moved as a whole; a body's hand is moved by its arm from its pose at ``first``, and the trunk does
+    not move. The other objects, at their placements at ``last``, are obstacles.
 
     Raises:
         InputError: Nothing was found.
     """
-    from warpjld.grasp.auto import find_grasp
     from warpjld.grasp.close import Closer
+    from warpjld.grasp.find_grasp import find_grasp
     from warpjld.grasp.intersection import intersection
 
     if actor.recorded is not None:
@@ -75,7 +75,7 @@ def grasp_by_itself(
 
 
 def key_grip(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:
-    """Keys of the joints: open at the first two frames, closed at the last; RELEASE opens them again."""
+    """Set keys of the joints: open at the first two frames, closed at the last; RELEASE opens them again."""
     from warpjld.skeleton import CHANNELS
 
     first, middle, last = frames
@@ -92,10 +92,10 @@ def key_grip(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, 
 
 
 def carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:
-    """Move a hand as a whole: away from the object, to it, and stay."""
+    """Set keys of a hand's placement: away from the object at the first frame, at it at the second and third."""
     from scipy.spatial.transform import Rotation
 
-    from warpjld.grasp.draws import WAY
+    from warpjld.grasp.random_placements import WAY
     from warpjld.motion import Key
 
     away = found.position - WAY * found.approach
@@ -108,7 +108,7 @@ def carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, flo
 
 
 def _through_body(scene: Scene, actor: Actor, covering: Covering, side: str, first: float, last: float) -> list[str]:
-    """Frames at which the arm of a body passes through the rest of it, in words."""
+    """Message about the frames at which the arm of a body passes through the rest of it; empty if there are none."""
     from warpjld.script.reaching import pierced_frames
     from warpjld.skeleton.arm import arm_of
 
@@ -129,7 +129,7 @@ def _by_arm(
     tries: int,
     posture_name: str | None,
 ) -> AutoGrasp:
-    """Let the arm bring the hand: before the object first, then to it."""
+    """Find a grasp within the arm's reach, and set the arm's keys: in front of the object, then at it."""
     from warpjld.script.grasp_by_arm import grasp_in_reach
     from warpjld.script.grasping import posture
     from warpjld.script.reaching import key_arm

@@ -1,4 +1,4 @@
-"""GRASP … BOTH … AUTO: two hands take what is too wide for one (A §10, R90)."""
+"""GRASP … BOTH … AUTO: finds a grasp with two hands and sets their keys (A §10, R90)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def both_hands(scene: Scene) -> dict[str, Actor]:
     """The actors that are a left and a right hand.
 
     Raises:
-        InputError: One is missing, they are one actor, hang on an arm or are driven by a MOTION file.
+        InputError: One is missing, both belong to one actor, one has an arm, or is driven by a MOTION file.
     """
     hands = {side: scene.actor_with(side) for side in ("left", "right")}
     for side, actor in hands.items():
@@ -36,10 +36,10 @@ def both_hands(scene: Scene) -> dict[str, Actor]:
 
 
 def grasp_by_both(scene: Scene, prop: Prop, first: float, last: float, tries: int) -> list[Attempt]:
-    """Find a grasp of two hands, and set keys of both: open and away from the object at ``first``, on it half-way,
-    closed at ``last``.
+    """Find a grasp with two hands, and set the keys of both.
 
-    The other objects are obstacles where they are at ``last``.
+    Open and away from the object at ``first``, on it half-way, closed at ``last``. The other objects, at their
+    placements at ``last``, are obstacles.
 
     Raises:
         InputError: Nothing was found.

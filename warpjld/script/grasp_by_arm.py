@@ -1,4 +1,4 @@
-"""GRASP … AUTO of a body: of the grasps that a hand finds one to which its arm comes (A §7, R90)."""
+"""GRASP … AUTO of a body: finds a grasp that the arm can reach (A §7, R90)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.grasp.arm_clearance import ArmClearance
-from warpjld.grasp.auto import AutoGrasp, find_grasp
-from warpjld.grasp.draws import WAY
+from warpjld.grasp.find_grasp import AutoGrasp, find_grasp
+from warpjld.grasp.random_placements import WAY
 from warpjld.script.grasping import posture
 from warpjld.script.reaching import REACHED, arm_to_hand
 from warpjld.skeleton.arm import Arm, arm_of
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
 __all__ = ["ArmGrasp", "grasp_in_reach"]
 
 _SEARCHES = 8
-"""Grasps, each found from other placements, of which the first is taken that the arm comes to."""
+"""Largest number of grasp searches, with different seeds; the first grasp within reach is taken."""
 _STRETCH = 1.1
-"""Lengths of the arm to which a hand comes at most from where its shoulder is: the girdle goes along a little."""
+"""Reach from the shoulder, in lengths of the arm; more than 1 because the shoulder girdle moves as well."""
 _SHORT = "its arm is {:.0f} mm short of the nearest grasp that was found"
 _OFF = math.radians(2.0)
-"""How far the hand may be turned from the grasp that was found."""
+"""Largest rotation error of the hand against the grasp that was found [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ArmGrasp:
-    """A grasp and the arm that brings the hand there.
+    """A grasp and the arm's angles that reach it.
 
     Attributes:
-        grasp: As found for the hand.
+        grasp: The grasp of the hand.
         arm: The arm.
-        there: Its angles at the grasp [rad], shape (n,).
-        before: Its angles with the open hand before the object, shape (n,).
+        there: Angles of the arm at the grasp [rad], shape (n,).
+        before: Angles of the arm with the open hand in front of the object [rad], shape (n,).
     """
 
     grasp: AutoGrasp
@@ -63,17 +63,18 @@ def grasp_in_reach(
     count: int,
     posture_name: str | None,
 ) -> ArmGrasp:
-    """Find grasps until the arm comes to one, inside its limits and without passing through the body.
+    """Search for grasps until the arm reaches one, inside its limits and without passing through the body.
 
     Args:
-        scene, actor: The body on its stage.
-        closer: Its hand and the object.
-        side: Which hand.
-        frames: When the open hand is at the object, and when it has closed.
-        obstacles, count, posture_name: As of ``find_grasp``.
+        scene: The scene.
+        actor: The body.
+        closer: ``Closer`` of its hand and the object.
+        side: ``left`` or ``right``.
+        frames: Frames at which the open hand is at the object, and at which it has closed.
+        obstacles: As for ``find_grasp``; likewise ``count`` and ``posture_name``.
 
     Raises:
-        InputError: No grasp was found, or the arm comes to none; says how far it is short of the nearest.
+        InputError: No grasp was found, or none is within reach; states how far the arm is short of the nearest.
     """
     arm = arm_of(actor.skeleton, side)
     poses, _ = posture(scene, actor, frames[0])
@@ -101,7 +102,7 @@ def grasp_in_reach(
             if beyond < nearest:
                 nearest, why = beyond, _SHORT.format(1e3 * beyond)
             if beyond > arm.length:
-                break  # nor does it come to any other
+                break  # the object itself is out of reach
             continue
         found, pierced = arm_to_hand(scene, actor, arm, clearance, frames[0], hand)
         if found.short < nearest:

@@ -1,4 +1,4 @@
-"""Searches of a script: where actors and objects are at a key, what was found, and what touches in the end."""
+"""Flexion searches and closing of hands in a script, their results (``Attempt``), and reports of contact."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpjld.script.staging import stage
 from warpjld.skeleton import Poses
 
 if TYPE_CHECKING:
-    from warpjld.grasp import Found, GraspObject
+    from warpjld.grasp import GraspObject, SearchResult
     from warpjld.script.crowd import Crowd
     from warpjld.script.facets import Facet
     from warpjld.script.props import Prop
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 __all__ = ["Attempt", "close_digits", "collisions", "contact_reports", "placed_at", "posture", "search_flexion"]
 
 
-_LOOKS = 6  # frames of a closing hand at which it is looked whether it enters other objects
+_LOOKS = 6  # frames of a closing motion at which collisions with other objects are tested
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """A search or a grasp and how it ended.
+    """Result of a search or grasp command, for the summary.
 
     Attributes:
-        command: As the script calls it, with what it was about.
-        frame: The key.
-        actor: Who.
-        object: What; empty where it was about no object.
-        status: One word.
-        message: For people.
-        values: More, as plain values.
+        command: The command with its main arguments.
+        frame: Frame of the key.
+        actor: Name of the actor.
+        object: Name of the object; empty where there is none.
+        status: Name of the status, see docs/reference/statuses.md.
+        message: Readable text.
+        values: Further results, as JSON values.
     """
 
     command: str
@@ -51,7 +51,7 @@ class Attempt:
     values: dict[str, Any]
 
     def content(self) -> dict[str, Any]:
-        """As plain values."""
+        """As a dictionary of JSON values."""
         plain = {k: getattr(self, k) for k in ("command", "frame", "actor", "object", "status", "message")}
         return plain | self.values
 
@@ -70,7 +70,7 @@ def posture(scene: Scene, actor: Actor, key: float) -> tuple[Poses, NDArray[np.f
 
 
 def placed_at(scene: Scene, prop: Prop, key: float) -> GraspObject:
-    """An object where it is at a frame."""
+    """An object with its shape and placement at a frame."""
     there = prop_places(scene.actors, scene.rate, prop, np.array([key]))
     thing = replace(prop.thing, vertices=prop.shape(key)) if prop.deforms else prop.thing
     return thing.placed(there.position[0], there.rotation[0])
@@ -86,9 +86,23 @@ def search_flexion(
     facet: Facet | None,
     distance: float,
     within: float,
-) -> tuple[Found, str]:
-    """The flexion of a joint, nearest to where it is, at which a vertex is so far from an object at a key, and what it
-    does not solve (R77)."""
+) -> tuple[SearchResult, str]:
+    """Search for the flexion of a joint at which a vertex has a given distance to an object (R77).
+
+    Args:
+        scene: The scene.
+        actor: The actor.
+        prop: The object.
+        key: The frame.
+        joint: Joint that flexes.
+        vertex: Welded vertex of the actor's surface.
+        facet: Facet of the object, or None for the nearest.
+        distance: Target distance [m].
+        within: Tolerance [m].
+
+    Returns:
+        The result nearest to the present angle, and a text about vertices of the hand that are then inside the object.
+    """
     from warpjld.grasp import NEAREST, FlexionSearch, ObjectSet, Searches
     from warpjld.grasp.intersection import intersection
     from warpjld.skeleton import poses_from_angles
@@ -120,7 +134,7 @@ def close_digits(
     digits: Sequence[str],
     coupling: tuple[float, float] | None,
 ) -> Attempt:
-    """Close digits on an object: keys of the open hand at ``first``, of the closed one at ``last``."""
+    """Close digits on an object and set keys: of the open hand at ``first``, of the closed one at ``last``."""
     from warpjld.grasp import SearchStatus
     from warpjld.grasp.close import Closer
     from warpjld.grasp.digits import digit_chains
@@ -154,7 +168,7 @@ def close_digits(
         message += f"; in the object before closing: {', '.join(begun)}"
     message += f"; {inside}"
     others = collisions(scene, actor, prop, first, last)
-    message += "".join(f"; {told}" for told in others)
+    message += "".join(f"; {text}" for text in others)
     status = "INSIDE" if begun else ("CONVERGED" if touching.any() else "NO_CONTACT")
     depth = round(1e3 * float(closed.penetration[0]), 4)
     values = {"digits": rows, "penetration_mm": depth, "collisions": others}
@@ -162,11 +176,11 @@ def close_digits(
 
 
 def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float) -> list[str]:
-    """Objects other than the held one that the hand enters while it closes, in words (R77)."""
+    """Messages about other objects that the hand enters while it closes (R77)."""
     from warpjld.grasp.hand_object_gaps import HandObjectGaps
     from warpjld.grasp.obstacles import COLLIDES
 
-    covering, told = cover(actor), []
+    covering, messages = cover(actor), []
     frames = np.linspace(first, last, _LOOKS)
     skins = covering.deform(stage(actor, frames, scene.rate))
     for prop in scene.props.values():
@@ -181,12 +195,13 @@ def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float
         frame, part = np.unravel_index(depths.argmax(), depths.shape)
         if depths[frame, part] > COLLIDES:
             depth = 1e3 * depths[frame, part]
-            told.append(f"collides with {prop.name}: {both.parts[part]} {depth:.2f} mm deep at frame {frames[frame]:g}")
-    return told
+            part_name, moment = both.parts[part], frames[frame]
+            messages.append(f"collides with {prop.name}: {part_name} {depth:.2f} mm deep at frame {moment:g}")
+    return messages
 
 
 def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:
-    """What touches which object at the keys of searches and grasps, and where objects are taken and let go."""
+    """Contacts of actors with objects, for the summary: at the keys of searches and grasps, and of attachments."""
     from warpjld.grasp.intersection import contacts
 
     moments: dict[tuple[str, str], set[float]] = {}
@@ -194,8 +209,8 @@ def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:
         if attempt.object:
             moments.setdefault((attempt.actor, attempt.object), set()).add(attempt.frame)
     for prop in crowd.props:
-        for one in prop.associations:
-            moments.setdefault((one.actor, prop.name), set()).update((one.start, one.stop))
+        for attached in prop.associations:
+            moments.setdefault((attached.actor, prop.name), set()).update((attached.start, attached.stop))
     rows = []
     for (actor, name), frames in moments.items():
         role = next(role for role in crowd.roles if role.actor.name == actor)
@@ -206,9 +221,9 @@ def contact_reports(scene: Scene, crowd: Crowd) -> list[dict[str, Any]]:
             parts = [
                 {"part": c.part, "vertices": c.vertices, "penetration_mm": round(1e3 * c.deepest, 3)} for c in found
             ]
-            told = ", ".join(f"{c.part} {c.vertices} vertices" for c in found) or "nothing touches"
+            message = ", ".join(f"{c.part} {c.vertices} vertices" for c in found) or "nothing touches"
             deepest = max((c.deepest for c in found), default=0.0)
             if found:
-                told += f"; deepest penetration {1e3 * deepest:.2f} mm"
-            rows.append({"frame": frame, "actor": actor, "object": name, "parts": parts, "message": told})
+                message += f"; deepest penetration {1e3 * deepest:.2f} mm"
+            rows.append({"frame": frame, "actor": actor, "object": name, "parts": parts, "message": message})
     return rows

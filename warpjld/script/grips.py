@@ -1,4 +1,4 @@
-"""What commands about grasps and grips have in common: two frames, a side, a hand that has grasped something."""
+"""Argument readers shared by the commands about grasps and grips: two frames, a side, a gripping actor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["flexions_of_grip", "gripping_actor", "read_actor", "read_frames", "r
 
 
 def read_frames(arguments: Arguments, begin: str, end: str) -> tuple[float, float]:
-    """Read ``<key1> <key2>``; the texts say what happens at these frames.
+    """Read ``<key1> <key2>``; the texts complete "the frame …" in error messages.
 
     Raises:
         InputError: key2 does not come after key1.
@@ -31,7 +31,7 @@ def read_frames(arguments: Arguments, begin: str, end: str) -> tuple[float, floa
 
 
 def read_side(scene: Scene, arguments: Arguments) -> str:
-    """Read ``[LEFT/RIGHT]``, in lower case: as written, or that of the current actor where it has only one."""
+    """Read ``[LEFT/RIGHT]``, in lower case; if it is left out, the only side of the current actor."""
     side = arguments.keyword(*SIDES)
     if side is not None:
         return side.lower()
@@ -43,7 +43,7 @@ def read_side(scene: Scene, arguments: Arguments) -> str:
 
 
 def read_actor(scene: Scene, arguments: Arguments) -> Actor:
-    """Read ``[LEFT/RIGHT]``: the actor whose hand is meant, the current one where none is named."""
+    """Read ``[LEFT/RIGHT]``: the actor with that hand; the current actor if it is left out."""
     side = arguments.keyword(*SIDES)
     return scene.actor_with(side) if side else scene.actor()
 
@@ -65,9 +65,9 @@ def gripping_actor(scene: Scene, arguments: Arguments) -> Actor:
 def flexions_of_grip(
     actor: Actor, grip: dict[str, float], frame: float
 ) -> Iterator[tuple[str, float, tuple[float, float]]]:
-    """Flexions that close a grip further: channel, value at a frame, and limits [rad].
+    """Flexions that tighten a grip: channel, value at a frame, and limits [rad].
 
-    Knuckles that GRASP left as they were stay so: their digit touches with what comes before them.
+    Second and third joints that GRASP did not flex are left out: the digit touches nearer to its base.
     """
     for channel in grip:
         joint, _, kind = channel.rpartition(".")

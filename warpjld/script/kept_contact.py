@@ -1,4 +1,4 @@
-"""What PRESS has solved is not lost where what follows fails: it is kept as a state, to be exported again."""
+"""Saves the state of a contact simulation when an error or Ctrl-C ends a run after PRESS has solved frames."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ __all__ = ["contact_kept"]
 
 @contextmanager
 def contact_kept(scene: Scene, folder: Path) -> Iterator[Callable[[Keep], None]]:
-    """While contact is solved and shown: where an error or Ctrl-C ends that, what is solved is kept, and told.
+    """Context in which contact is solved and exported; on an exception, the frames solved so far are saved.
 
     Args:
-        scene: Told, as a warning.
-        folder: The output folder, which may be gone again.
+        scene: Is warned of where the state was saved.
+        folder: The output folder; made again if it was removed.
 
     Yields:
-        For ``simulate``'s ``keeping``.
+        Function to pass to ``simulate`` as ``keeping``.
     """
     known: list[Keep] = []
     try:
@@ -38,7 +38,7 @@ def contact_kept(scene: Scene, folder: Path) -> Iterator[Callable[[Keep], None]]
 
 
 def _kept(keep: Keep, folder: Path) -> str:
-    """Keep it; what there is to tell."""
+    """Save the state; a message for the user, empty if there was nothing to save."""
     missing = not folder.exists()
     try:
         make_folder(folder)
@@ -46,8 +46,8 @@ def _kept(keep: Keep, folder: Path) -> str:
         if path is None and missing:
             folder.rmdir()
     except (WarpjldError, OSError, MemoryError) as error:
-        return f"what PRESS has solved cannot be kept: {error}"
+        return f"the frames that PRESS has solved cannot be saved: {error}"
     if path is None:
         return ""
     state = path.relative_to(folder)
-    return f'what PRESS has solved is kept in {path}: with STATE "{state}" it is exported again, or gone on from'
+    return f'the frames that PRESS has solved are kept in {path}: PRESS … STATE "{state}" exports them or continues'

@@ -1,4 +1,4 @@
-"""Naming an actor's joints and setting their keys, within the joints' limits."""
+"""Reading joints in commands, and setting keys of joint angles within the joints' limits."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ __all__ = ["DIGIT_WORDS", "SIDES", "joint_numbers", "named_joint", "read_joint",
 
 SIDES = ("LEFT", "RIGHT")
 DIGIT_WORDS = ("THUMB", "INDEX", "MIDDLE", "RING", "PINKY")
-_SLACK = 1e-6  # degrees: limits come out of radians
+_SLACK = 1e-6  # tolerance on limits, which are converted from radians [degrees]
 
 
 def joint_numbers(skeleton: Skeleton) -> dict[int, int]:
-    """Number a script may call a joint by → joint: the paper's numbers (A Fig. 2, R7) where the skeleton is a single
-    hand; its own order elsewhere."""
+    """Joints by their number in scripts: the paper's (A Fig. 2, R7) for a single hand, else the skeleton's order."""
     sides = [side for side in ("left", "right") if f"{side}.index.base" in skeleton.names]
     if len(sides) != 1 or f"{sides[0]}.shoulder" in skeleton.names:
         return {joint: joint for joint in range(len(skeleton))}
@@ -36,9 +35,9 @@ def read_joint(scene: Scene, arguments: Arguments, side: str | None = None) -> t
     """Read a joint, by name or by number: of the current actor, or of the one whose side the name begins with.
 
     Args:
-        scene: The stage.
-        arguments: Where to read.
-        side: A side read before, which then need not be in the name.
+        scene: The scene.
+        arguments: The command's arguments.
+        side: A side that was read before, which the name then need not contain.
 
     Raises:
         InputError: There is no such joint.
@@ -80,10 +79,10 @@ def set_keys(
     constants: SplineConstants,
     arguments: Arguments,
 ) -> None:
-    """Read ``<key1> <key2> <step> <degrees>`` and set the value at these keys of one channel of some joints.
+    """Read ``<key1> <key2> <step> <degrees>`` and set the value at these keys in one channel of several joints.
 
     Raises:
-        InputError: A joint the actor lacks, keys that make no sense, or an angle beyond the joint's limits.
+        InputError: A joint the actor lacks, invalid keys, or an angle beyond the joint's limits.
     """
     names = [joint.lower() for joint in joints]
     for name in names:

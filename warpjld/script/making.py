@@ -1,4 +1,4 @@
-"""A scene's outputs made: bind → poses → deform, block after block, into exports, films and pictures."""
+"""Production of a scene's outputs: bind, pose and deform block by block; write exports, films and pictures."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Making", "Report", "cast", "exported_props", "prop_export_name"]
 
-_BLOCK = 16  # frames deformed at once: memory does not grow with the length of the film
+_BLOCK = 16  # frames deformed per batch, so that memory does not grow with the length of the film
 
 Studio = FilmStudio | PressureStudio | PageStudio
 Report = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
+"""Progress callback: name of the stage, steps done, steps in total."""
 
 
 @dataclass(eq=False)
 class Making:
-    """What a scene asks for, being made.
+    """State of a run that makes the outputs of a scene; arguments as for ``run_scene``.
 
     Attributes:
-        keeping: Told what keeps contact that is solved (``contact_kept``).
+        keeping: Passed to ``simulate``, see ``contact_kept``.
         failures: Outputs that could not be made.
-        contact: What PRESS found.
+        contact: Result of PRESS, if there was one.
     """
 
     scene: Scene
@@ -67,7 +67,7 @@ class Making:
     contact: Simulation | None = None
 
     def all(self) -> dict[str, Any]:
-        """Make it; the summary's content."""
+        """Make all outputs; the summary's content."""
         scene, frames, outputs, failures, summary = self.scene, self.frames, self.outputs, self.failures, self.summary
         with OutputFolder(self.folder) as out:
             with summary.timed("bind"):
@@ -98,18 +98,18 @@ class Making:
             return summary.write(out)
 
     def _solved(self) -> Crowd:
-        """Solve contact; the scene as it is then."""
+        """Solve contact; the actors and objects with their deformed surfaces."""
         summary = self.summary
         with summary.timed("contact"):
             found = self.contact = run_contact(self.scene, self.folder, self.progress, self.keeping)
-        summary.press = found.verdict.content() | {"searches": [one.content() for one in found.grips]}
+        summary.press = found.verdict.content() | {"searches": [grip.content() for grip in found.grips]}
         summary.notes += found.notes
         return replace(cast(self.scene, self.frames, device=self.device), pressed=found.surfaces)
 
     def unsolved(self, found: Simulation) -> InputError:
-        """What is to be told where not all frames were solved."""
-        told = found.verdict.frames
-        kept = "no frame" if told is None else f"frames {told[0]:g} to {told[1]:g}"
+        """Error to raise where not all frames were solved."""
+        solved = found.verdict.frames
+        kept = "no frame" if solved is None else f"frames {solved[0]:g} to {solved[1]:g}"
         pressing = self.scene.contact.pressing
         return located(
             InputError(f"contact was not solved: {found.verdict.text}; {kept} and all files are in {self.folder}"),
@@ -124,7 +124,7 @@ def cast(
     device: str = "cpu",
     progress: Report = lambda what, done, total: None,
 ) -> Crowd:
-    """Bind every actor's surface and pose it at these frames."""
+    """Bind every actor's surface and pose it at frames (F,)."""
     roles = []
     for number, actor in enumerate(scene.actors.values()):
         progress(f"binding {actor.name.lower()}", number, len(scene.actors))
@@ -133,11 +133,12 @@ def cast(
 
 
 def exported_props(export: Export, scene: Scene) -> list[Prop]:
-    """Objects go along where all actors are exported."""
+    """Objects that an export includes: all of them where all actors are exported, else none."""
     return list(scene.props.values()) if export.actor is None else []
 
 
 def prop_export_name(export: Export, prop: Prop) -> str:
+    """Name of an object's file: ``hands-apple.usd`` beside ``hands.usd``."""
     path = PurePosixPath(export.name)
     return str(path.with_name(f"{path.stem}-{prop.name.lower()}{path.suffix}"))
 
@@ -152,7 +153,7 @@ def _make_sequences(
     progress: Report,
     failures: Failures,
 ) -> None:
-    """Exports and films, in one pass over the frames."""
+    """Write exports and films in one pass over the frames."""
     from warpjld.io.caches import open_cache
 
     def cache_of(name: str, surface: Surface, label: str) -> Writer[Cache]:
@@ -218,7 +219,7 @@ def _make_sequences(
 def _together(
     blocks: Sequence[Iterator[tuple[int, NDArray[np.float32]]]], count: int
 ) -> Iterator[tuple[int, tuple[tuple[int, NDArray[np.float32]], ...]]]:
-    """Blocks of frames of all actors, with the place of the first frame; of no actor where there is none."""
+    """Blocks of frames of all actors together, each with the index of its first frame; also where there is no actor."""
     if not blocks:
         yield from ((start, ()) for start in range(0, count, _BLOCK))
     for parts in zip(*blocks, strict=True):
@@ -242,6 +243,7 @@ def _make_pictures(
     title: str,
     failures: Failures,
 ) -> None:
+    """Draw pictures and contact sheets."""
     wanted = [output for output in outputs if isinstance(output, Picture | ContactSheet)]
     for number, output in enumerate(wanted):
         progress("pictures", number, len(wanted))

@@ -1,5 +1,4 @@
-"""The animator's two measures, as text: how far a vertex is from a facet, and what of a segment is in an object
-(A §7.1, §7.2, R73, R75, R132)."""
+"""Texts of SHOW DISTANCE and SHOW INTERSECTION: vertex to facet, segment in object (A §7.1, §7.2, R73, R75, R132)."""
 
 from __future__ import annotations
 
@@ -20,7 +19,7 @@ __all__ = ["distance", "intersection_text"]
 
 
 def distance(scene: Scene, actor: Actor, frame: float, vertex: int, prop: Prop, facet: Facet) -> str:
-    """Where a vertex is in the basis of a facet at a frame: y along the normal, negative behind it."""
+    """Text with the coordinates of a vertex in the basis of a facet at a frame: y along the normal, negative behind."""
     covering = cover(actor)
     point = covering.points(stage(actor, np.array([frame]), scene.rate), [vertex])[0, 0].astype(np.float64)
     (x, y, z), inside = facet.coordinates(point, placed_at(scene, prop, frame))
@@ -33,7 +32,7 @@ def distance(scene: Scene, actor: Actor, frame: float, vertex: int, prop: Prop, 
 
 
 def intersection_text(scene: Scene, actor: Actor, frame: float, part: str, prop: Prop) -> str:
-    """Vertices of a segment that lie in an object at a frame, deepest first, with their depths.
+    """Text with the vertices of a segment that lie in an object at a frame, deepest first, with their depths.
 
     Raises:
         InputError: There is no such segment.

@@ -1,4 +1,4 @@
-"""Where a command stands in menus: by its group, or where its author wants it (R88)."""
+"""Menu and entry of every command in the studio: by its group, or as its author chose (R88)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from warpjld.script.registry import Command, Function
 __all__ = ["MENUS", "menu", "place_in_menus"]
 
 MENUS = ("File", "Edit", "Pose", "Hand", "Objects", "Grasp", "Contact", "View", "Help")
-"""Menus in the order in which they stand; those that commands of users add come after them."""
+"""Menus in display order; menus that user commands add come after them."""
 
 _OF_GROUP = {
     "Actors": "Hand",
@@ -33,13 +33,13 @@ _chosen: dict[Function, tuple[str, str]] = {}
 
 
 def menu(place: str) -> Callable[[_F], _F]:
-    """Decorator: put a command's entry in a menu of the studio, above or below ``command``.
+    """Decorator: choose the menu and entry of a command in the studio; used above or below ``@command``.
 
     Args:
-        place: ``Menu/Entry``, such as ``"Pose/My trick"``; a menu that is not there is made.
+        place: ``Menu/Entry``, such as ``"Pose/My trick"``; a menu that does not exist is added.
 
     Raises:
-        InputError: It is no such place.
+        InputError: Not of that form.
 
     Examples:
         >>> @wj.menu("Pose/Wave once")

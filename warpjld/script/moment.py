@@ -1,4 +1,4 @@
-"""A scene and its macros at one moment, to come back to: what undoing a line, or editing one, starts from."""
+"""Snapshots of a scene and its macros, for undoing and editing lines of a script."""
 
 from __future__ import annotations
 
@@ -14,25 +14,24 @@ __all__ = ["Moment", "moment_of"]
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A scene and its macros as they were; nothing that happens later changes it."""
+    """Snapshot of a scene and its macros; later commands do not change it."""
 
     scene: Scene
     macros: dict[str, MacroDefinition]
 
     def resume(self) -> Interpreter:
-        """An interpreter that goes on from here, on this very scene: resume a ``copy`` to come back more than once."""
+        """Interpreter that continues on this snapshot's own scene; ``copy`` first to resume repeatedly."""
         interpreter = Interpreter(self.scene)
         interpreter.macros = dict(self.macros)
         return interpreter
 
     def copy(self) -> Moment:
-        """The same moment with a scene of its own."""
+        """Copy with a scene of its own."""
         return Moment(_copied(self.scene), dict(self.macros))
 
 
 def moment_of(interpreter: Interpreter) -> Moment:
-    """The scene of an interpreter as it is now: rigs, bound surfaces and objects, which nothing changes, are not
-    copied."""
+    """Snapshot of an interpreter's scene; rigs, coverings and objects, which are immutable, are shared."""
     return Moment(_copied(interpreter.scene), dict(interpreter.macros))
 
 
@@ -42,4 +41,4 @@ def _copied(scene: Scene) -> Scene:
         fixed += [actor.rig, actor.skeleton, actor.parameters, actor.covering, actor.recorded]
     for prop in scene.props.values():
         fixed += [prop.thing, prop.shapes]
-    return deepcopy(scene, {id(one): one for one in fixed})
+    return deepcopy(scene, {id(shared): shared for shared in fixed})

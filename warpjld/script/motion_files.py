@@ -1,4 +1,4 @@
-"""The motion of actors, on the joints of their rigs' own files."""
+"""Motion files of actors, on the joints of their rigs' own files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def write_motions(
     out: OutputFolder,
     failures: Failures,
 ) -> list[str]:
-    """Write what was asked for, at these frames (F,); returns notes, and warns through the scene."""
+    """Write the motion files among the outputs, at frames (F,); returns notes, and warns through the scene."""
     from warpjld.motion.out import write_motion
 
     notes: list[str] = []

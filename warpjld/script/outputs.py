@@ -1,4 +1,4 @@
-"""Files a script asks for, and the camera they are taken with."""
+"""Specifications of a script's output files, and of cameras."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PictureStyle = Literal["shaded", "wireframe", "pressure"]
 
 @dataclass(frozen=True)
 class CameraKey:
-    """Where a camera is at a frame, with the constants of the spline there: tension, continuity, bias."""
+    """Key of a camera: position and target [m], zoom, roll [rad], and spline constants (tension, continuity, bias)."""
 
     frame: float
     position: tuple[float, float, float]
@@ -39,9 +39,9 @@ class CameraKey:
 
 @dataclass(frozen=True)
 class CameraSetting:
-    """Where pictures are taken from: a named view, or a position and a target [m], turned about its sight [rad].
+    """Camera of pictures and films: a named view, or position and target [m] with a roll about the line of sight [rad].
 
-    With ``follow`` it goes along with the root of the first actor; with ``keys`` it moves.
+    With ``follow`` it moves with the root of the first actor; with ``keys`` it is animated.
     """
 
     view: str | None = None
@@ -55,7 +55,7 @@ class CameraSetting:
 
 @dataclass(frozen=True)
 class Shot:
-    """Frames of a film that one camera takes, both included."""
+    """A range of frames, both included, with its camera."""
 
     name: str
     first: int
@@ -65,8 +65,11 @@ class Shot:
 
 @dataclass(frozen=True)
 class Picture:
-    """One frame as a PNG; coloured by pressure perhaps of one actor or object ``only``, or of its ``digits``; or with
-    the ``numbers`` of all vertices and facets, or only its."""
+    """One frame as a PNG.
+
+    Style ``pressure`` colours all bodies, or one actor or object ``only``, or ``digits`` of it. With ``numbers``,
+    vertices and facets (of ``only``, or of all) are labelled.
+    """
 
     name: str
     frame: float
@@ -79,8 +82,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class FilmOutput:
-    """All frames as a film, or those of ``shots`` through their cameras; coloured by pressure perhaps of one actor or
-    object ``only``, or of its ``digits``."""
+    """A film of all frames, or of ``shots`` with their cameras; ``only`` and ``digits`` as for ``Picture``."""
 
     name: str
     style: PictureStyle
@@ -92,7 +94,7 @@ class FilmOutput:
 
 @dataclass(frozen=True)
 class ContactSheet:
-    """Several frames on one PNG, each as wire-frame and shaded."""
+    """A contact sheet: several frames on one PNG, each as wire-frame and shaded."""
 
     name: str
     frames: tuple[float, ...]
@@ -101,7 +103,7 @@ class ContactSheet:
 
 @dataclass(frozen=True)
 class Export:
-    """The animated surface of one actor, or of all."""
+    """The animated surface of one actor, or of all actors and objects."""
 
     name: str
     actor: str | None
@@ -124,7 +126,7 @@ class Table:
 
 @dataclass(frozen=True)
 class TactileOutput:
-    """What the skin of an actor, or of the first whose flesh deforms, feels over time: CSV, Parquet or a plot."""
+    """Tactile signals of an actor (None: the first with deformable flesh) over time: CSV, Parquet or a plot."""
 
     name: str
     actor: str | None
@@ -132,7 +134,7 @@ class TactileOutput:
 
 @dataclass(frozen=True)
 class Grips:
-    """Grips that were searched for, and all that were tried, as CSV."""
+    """Results of grip searches with all trials, as CSV."""
 
     name: str
 

@@ -1,4 +1,4 @@
-"""A ``FILM`` as a page: an animation that is turned with the mouse while it plays."""
+"""A ``FILM`` as an HTML page: an interactive 3D animation."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ __all__ = ["PageStudio", "page_studio"]
 
 
 class PageStudio:
-    """Takes frame after frame of a page."""
+    """Records the frames of a page."""
 
     def __init__(self, crowd: Crowd, film: FilmOutput, page: PageRecording) -> None:
         self._crowd, self._film, self._page = crowd, film, page
         self._view = PressureView(crowd, film.only, film.digits) if film.style == "pressure" else None
 
     def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
-        """The frame of that place in the sequence, with the vertices of all actors [m], shape (V, 3)."""
+        """Record the ``frame``-th of the frames, with the concatenated vertices of all actors [m], shape (V, 3)."""
         shift = self._crowd.shift(self._film.camera, frame)
         props, moved = self._crowd.props, self._crowd.solid_vertices(frame, shift)
         if self._view is None:
@@ -44,6 +44,6 @@ class PageStudio:
 
 @contextmanager
 def page_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Iterator[PageStudio]:
-    """A page being made."""
+    """Context that records a page."""
     with PageRecording(path, rate=scene.rate) as page:
         yield PageStudio(crowd, film, page)

@@ -1,4 +1,4 @@
-"""Text → statements with positions, by the grammar beside this file."""
+"""Parser of scripts: text to statements with positions, by ``grammar.lark``."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _EXPECTED = {
 
 
 class UnfinishedError(InputError):
-    """The text stops inside a MACRO: at a prompt, more may follow."""
+    """The text ends inside a MACRO; at a prompt, further lines are read."""
 
 
 def parse_file(path: str | Path) -> tuple[Node, ...]:
@@ -57,7 +57,7 @@ def parse_file(path: str | Path) -> tuple[Node, ...]:
 
 
 def parse(text: str, path: str = "<script>") -> tuple[Node, ...]:
-    """Statements of a text; ``path`` is what errors call it. Raises as ``parse_file``."""
+    """Statements of a text; ``path`` stands for it in errors. Raises as ``parse_file``."""
     from lark.exceptions import UnexpectedInput
 
     try:
@@ -78,7 +78,7 @@ def _lark() -> Lark:
 
 
 class _Builder:
-    """Parse tree → records."""
+    """Converts lark's parse tree to statements."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -131,7 +131,7 @@ def _is_tree(child: Any) -> bool:
 
 
 def _explained(error: UnexpectedInput, text: str, path: str) -> InputError:
-    """lark's error as ours: what was found, what was expected, where."""
+    """Convert a syntax error of lark to an InputError with what was found, what was expected, and where."""
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
     line, column = error.line, error.column

@@ -1,4 +1,4 @@
-"""Outputs of which every actor has a file of its own: which actors, and what each file is called."""
+"""Outputs with one file per actor: their actors and file names."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ __all__ = ["actors_of", "file_of"]
 
 
 def actors_of(output: Export | MotionFile, scene: Scene) -> list[Actor]:
-    """The actors that a line asks for."""
+    """The actors that an output includes."""
     return [actor for actor in scene.actors.values() if output.actor in (None, actor.name)]
 
 
 def file_of(output: Export | MotionFile, actor: Actor, scene: Scene) -> str:
-    """``hands.usd``; for one of several actors ``hands-left.usd``: each has joints and a vertex order of its own."""
+    """Name of an actor's file: ``hands.usd``, or ``hands-left.usd`` where the output includes several actors."""
     if output.actor is not None or len(scene.actors) == 1:
         return output.name
     path = PurePosixPath(output.name)

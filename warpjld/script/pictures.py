@@ -30,19 +30,19 @@ __all__ = [
     "sheet_frames",
 ]
 
-_CELL = (5 / 12, 19 / 36)  # of the height of a picture: a contact sheet's cell, upright as a hand is
-_CELLS = 6  # on a contact sheet whose frames nobody listed
+_CELL = (5 / 12, 19 / 36)  # width and height of a contact sheet's cell, relative to the height of a picture
+_CELLS = 6  # cells on a contact sheet whose frames are not listed
 
 
 class FilmView:
-    """Where a film is taken from, and how its lamps shine, frame by frame."""
+    """Cameras and lamps of a film, frame by frame."""
 
     def __init__(self, scene: Scene, crowd: Crowd, asked: FilmOutput, stage: render.SceneRenderer) -> None:
         self._scene, self._crowd, self._asked, self._stage = scene, crowd, asked, stage
         self._views: dict[CameraSetting, render.Camera] = {}
 
     def at(self, place: int) -> CameraSetting | None:
-        """Turn the stage's camera and lamps to the frame of that place; the camera, or None where no shot shows it."""
+        """Set the renderer's camera and lamps for the ``place``-th frame; the camera, or None outside all shots."""
         frame = float(self._crowd.frames[place])
         camera = self._asked.camera
         if self._asked.shots:
@@ -65,17 +65,17 @@ class FilmView:
 
 
 def lamps_at(scene: Scene, frame: float) -> list[render.Lamp]:
-    """How the lamps of a scene shine at a frame."""
+    """The lamps of a scene at a frame."""
     return [lamp.at(frame) for lamp in scene.lamps.values()]
 
 
 def style_of(scene: Scene) -> render.Style:
-    """Colours of a scene."""
+    """Rendering style of a scene."""
     return render.Style() if scene.backdrop is None else render.Style(background=scene.backdrop)
 
 
 class FilmStudio:
-    """Takes frame after frame of a film."""
+    """Renders the frames of a film."""
 
     def __init__(
         self, scene: Scene, crowd: Crowd, asked: FilmOutput, stage: render.SceneRenderer, film: render.Film
@@ -84,7 +84,7 @@ class FilmStudio:
         self._stage, self._film = stage, film
 
     def take(self, frame: int, vertices: NDArray[np.float32]) -> None:
-        """The frame of that place in the sequence, with the vertices of all actors [m], shape (V, 3)."""
+        """Render the ``frame``-th of the frames, with the concatenated vertices of all actors [m], shape (V, 3)."""
         camera = self._view.at(frame)
         if camera is None:
             return
@@ -94,7 +94,7 @@ class FilmStudio:
 
 
 class PressureStudio:
-    """Takes frame after frame of a film in the colours of contact pressure."""
+    """Renders the frames of a film coloured by contact pressure."""
 
     def __init__(
         self, scene: Scene, view: PressureView, asked: FilmOutput, stage: render.SceneRenderer, film: render.Film
@@ -116,7 +116,7 @@ class PressureStudio:
 
 @contextmanager
 def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Iterator[FilmStudio | PressureStudio]:
-    """A ``FILM`` being taken."""
+    """Context that renders a ``FILM``."""
     camera = crowd.camera(film.camera, scene.size)
     quality = render.Quality.film()
     with render.Film(path, rate=scene.rate) as writer:
@@ -141,15 +141,15 @@ def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Ite
 
 
 def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
-    """A ``PICTURE``; the camera shows the whole sequence, so that pictures of one scene fit together."""
+    """Draw a ``PICTURE``; a named view is framed for the whole sequence, so that pictures of a scene match."""
     now = crowd.at(picture.frame, scene.rate)
     shift = now.shift(picture.camera, 0)
     camera = crowd.camera(picture.camera, scene.size, picture.frame)
     if picture.style == "pressure":
-        solved = [] if crowd.pressed is None else [one.frame for one in crowd.pressed.frames]
+        solved = [] if crowd.pressed is None else [frame.frame for frame in crowd.pressed.frames]
         if crowd.pressed is not None and picture.frame > max(solved, default=crowd.pressed.model.start):
             reached = f"only up to frame {max(solved):g}" if solved else "at no frame"
-            raise InputError(f"contact was solved {reached}: nothing is known of pressure at frame {picture.frame:g}")
+            raise InputError(f"contact was solved {reached}: there is no pressure at frame {picture.frame:g}")
         view = PressureView(now, picture.only, picture.digits)
         points, values = view.at(0, now.surface(0))
         with view.stage(camera, scene.size, render.Quality(), shift) as stage_:
@@ -173,7 +173,7 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
 
 
 def _numbered(now: Crowd, only: str | None, shift: NDArray[np.float64]) -> list[render.Numbered]:
-    """Actors and objects whose numbers are shown, as they are drawn."""
+    """Actors and objects whose vertex and facet numbers are drawn."""
     found, points, start = [], now.surface(0) - shift, 0
     for role in now.roles:
         surface = role.covering.surface
@@ -191,7 +191,7 @@ def _numbered(now: Crowd, only: str | None, shift: NDArray[np.float64]) -> list[
 
 
 def draw_contact_sheet(scene: Scene, crowd: Crowd, sheet: ContactSheet, path: Path, title: str) -> None:
-    """A ``CONTACT`` sheet: A Figs 14 and 15 on one page."""
+    """Draw a ``CONTACT`` sheet (as A Figs 14 and 15)."""
     frames = sheet.frames or sheet_frames(scene, crowd.frames)
     cell = max(16, round(_CELL[0] * scene.size[1])), max(16, round(_CELL[1] * scene.size[1]))
     moments = [crowd.at(frame, scene.rate) for frame in frames]
@@ -220,7 +220,7 @@ def sheet_frames(scene: Scene, frames: NDArray[np.float64]) -> tuple[float, ...]
 
 
 def preview(scene: Scene, frame: float, style: PictureStyle) -> Path:
-    """A picture of any frame of the scene as it is, in the output folder (R5)."""
+    """Draw a picture of any frame of the present scene into the output folder (R5); its path."""
     roles = [role_of(a, np.array([frame]), scene.rate) for a in scene.actors.values()]
     crowd = Crowd(
         roles,

@@ -1,4 +1,4 @@
-"""Where an actor stands: keyed displacements and rotations of the whole."""
+"""Key-framed placement of actors and objects: displacement and rotation of the whole."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _AXES = "xyz"
 
 @dataclass(eq=False)
 class Placement:
-    """Keys of six channels: ``move.x`` … [m] from the rest place, ``turn.x`` … [rad] about the root or origin."""
+    """Keys of six channels: ``move.x`` … [m] from the initial position, ``turn.x`` … [rad] about the root or origin."""
 
     tracks: dict[str, Track] = field(default_factory=dict)
 
@@ -31,7 +31,7 @@ class Placement:
         self.tracks.setdefault(channel, Track(channel)).set(key)
 
     def values(self, kind: str, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        """``move`` [m] or ``turn`` [rad] at F frames, shape (F, 3); 0 where nothing is keyed."""
+        """``move`` [m] or ``turn`` [rad] at F frames, shape (F, 3); 0 for channels without keys."""
         columns = [
             track.spline(frames) if (track := self.tracks.get(f"{kind}.{axis}")) else np.zeros(len(frames))
             for axis in _AXES
@@ -39,7 +39,7 @@ class Placement:
         return np.stack(columns, axis=-1)
 
     def apply(self, poses: Poses, frames: NDArray[np.float64]) -> Poses:
-        """Poses of these frames, turned about the root, then displaced."""
+        """Poses of these frames, rotated about the root, then displaced."""
         if not self.tracks:
             return poses
         turn = Rotation.from_euler("xyz", self.values("turn", frames))
@@ -50,7 +50,7 @@ class Placement:
         return Poses(positions, _left_product(turn.as_quat(), poses.rotations), poses.flexion)
 
     def apply_to_places(self, places: Places, frames: NDArray[np.float64]) -> Places:
-        """Places of an object at these frames, turned about its origin, then displaced."""
+        """Placements of an object at these frames, rotated about its origin, then displaced."""
         from warpjld.grasp import Places
 
         if not self.tracks:
@@ -60,7 +60,7 @@ class Placement:
 
 
 def _left_product(turn: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternion of a frame times those of its joints; keeps the signs that were aligned along the tree."""
+    """Quaternion product of ``turn`` (F, 4) with joint rotations (F, J, 4), without changing the joints' signs."""
     vector, scalar = turn[:, None, :3], turn[:, None, 3:]
     v, s = rotations[..., :3], rotations[..., 3:]
     return np.concatenate(

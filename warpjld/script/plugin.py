@@ -1,4 +1,4 @@
-"""A Python file that adds commands, run on request."""
+"""Loading of Python files that add commands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def load_commands(path: Path) -> None:
     """Import a Python file, so that its ``@command`` decorators run (R88).
 
     Raises:
-        InputError: It cannot be read, or fails: names the line.
+        InputError: It cannot be read, or raises an exception; names the line.
     """
     if not path.is_file():
         raise InputError("cannot read commands: no such file", path=path)
@@ -36,7 +36,7 @@ def load_commands(path: Path) -> None:
 
 
 def _line(error: BaseException, path: Path) -> int | None:
-    """Where in the file itself an error came up."""
+    """Line in the file at which an error occurred, or None."""
     line, trace = None, error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == str(path):

@@ -1,8 +1,8 @@
-"""Poses of a hand in files: angles of the digits' joints in degrees, of any hand whatever its size and side.
+"""Files of hand poses: joint angles of the digits in degrees, for hands of any size and side.
 
     {"pose": "fist", "angles": {"index.base.flexion": 84, "index.knuckle2.flexion": 100, ...}}
 
-Channels of the digits that a file does not name are 0 in its pose; the wrist belongs to no pose.
+Channels of the digits that a file does not name are 0. The wrist is not part of a pose.
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ SHIPPED = (
     *("flat", "relaxed", "fist", "point", "pinch", "tripod"),
     *("hook", "cylinder", "sphere", "lateral", "spread", "thumb-up"),
 )
-"""Poses that come with the package."""
+"""Names of the poses that come with the package."""
 
 
 def hand_channels(actor: Actor, side: str) -> dict[str, tuple[float, float]]:
-    """Channels of the digits of one hand that may move, such as ``index.base.flexion``, with their limits in
-    degrees."""
+    """Movable channels of the digits of one hand, such as ``index.base.flexion``, with their limits [degrees]."""
     found = {}
     for joint, name in enumerate(actor.skeleton.names):
         where, _, rest = name.partition(".")
@@ -46,10 +45,10 @@ def hand_channels(actor: Actor, side: str) -> dict[str, tuple[float, float]]:
 
 
 def shipped_pose(name: str) -> dict[str, float]:
-    """Degrees by channel of a pose that comes with the package.
+    """Angles [degrees] by channel of a pose that comes with the package.
 
     Raises:
-        InputError: There is none of that name.
+        InputError: There is no pose of that name.
     """
     if name.lower() not in SHIPPED:
         raise InputError(f"there is no pose {name}{one_of(name.lower(), SHIPPED)}")
@@ -58,10 +57,10 @@ def shipped_pose(name: str) -> dict[str, float]:
 
 
 def load_pose(path: Path) -> dict[str, float]:
-    """Degrees by channel of a pose in a file.
+    """Angles [degrees] by channel of a pose in a file.
 
     Raises:
-        InputError: It is no such file, names a channel that no hand has, or an angle that is no number.
+        InputError: Not a pose file, a channel that no hand has, or an angle that is not a number.
     """
     try:
         content = json.loads(read_text(path))
@@ -71,13 +70,14 @@ def load_pose(path: Path) -> dict[str, float]:
 
 
 def save_pose(path: Path, angles: Mapping[str, float]) -> None:
-    """Write a pose: degrees by channel."""
+    """Write a pose: angles [degrees] by channel."""
     rounded = {name: round(value, 2) for name, value in angles.items() if abs(value) >= 0.005}
     with whole_file(path) as part:
         part.write_text(json.dumps({"pose": path.stem, "angles": rounded}, indent=1) + "\n", encoding="utf-8")
 
 
 def _angles(content: object, path: Path) -> dict[str, float]:
+    """Checked angles [degrees] by channel, of a file's parsed content."""
     angles = content.get("angles") if isinstance(content, dict) else None
     if not isinstance(angles, dict):
         raise InputError('no pose: want {"angles": {"index.base.flexion": 30, ...}}', path=path)

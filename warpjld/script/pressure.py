@@ -1,4 +1,4 @@
-"""Actors and objects in the colours of contact pressure (R95)."""
+"""Display of actors and objects coloured by contact pressure (R95)."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 __all__ = ["PressureView"]
 
-_COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
-_NOTHING = 1.0  # Pa: the scale's top where nothing touches
+_COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")  # colour scale, from 0 to the peak
+_NOTHING = 1.0  # smallest upper end of the colour scale [Pa]
 
 
 class PressureView:
-    """Everything that deforms as one coloured surface; or one actor or object alone, with nothing before it.
+    """All deformable bodies as one coloured surface; or a single actor or object, with nothing in front of it.
 
     Args:
-        crowd: Actors and objects, pressed.
-        only: Name of the one to show.
-        digits: Those of it to show, or its palm; none for all.
+        crowd: Actors and objects with their contact solution.
+        only: Name of the one to show; None for all.
+        digits: Digits of it to show, or ``palm``; empty for all.
     """
 
     def __init__(self, crowd: Crowd, only: str | None, digits: Sequence[str] = ()) -> None:
@@ -53,7 +53,7 @@ class PressureView:
             self._refined.append(surface)
             faces.append(self._of_digits(name, surface, digits) + start)
             start += count + len(surface.edges)
-        if not faces:  # an obstacle alone: nothing is known of its own pressure
+        if not faces:  # an obstacle alone has no pressure of its own: shown with zero pressure
             prop = crowd.props[self._plain[0]]
             self._refined = [self._surface(prop.name, prop.thing.faces, len(prop.thing.vertices))]
             faces, self._colored, self._plain = [prop.thing.faces], self._plain[:1], []
@@ -64,17 +64,17 @@ class PressureView:
 
     @property
     def faces(self) -> NDArray[np.int32]:
-        """Triangles of what is coloured, over the vertices that ``at`` gives, shape (T, 3)."""
+        """Triangles of the coloured surface, over the vertices that ``at`` returns, shape (T, 3)."""
         return self._faces
 
     @property
     def scale(self) -> render.ColorScale:
-        """Colours of pressures [Pa]."""
+        """Colour scale of pressures [Pa]."""
         return self._scale
 
     @property
     def plain(self) -> list[Prop]:
-        """Objects that are shown in their own colour."""
+        """Objects that are drawn in their own colour."""
         return [self.crowd.props[k] for k in self._plain]
 
     def stage(
@@ -84,7 +84,7 @@ class PressureView:
         quality: render.Quality,
         shift: NDArray[np.float64] | float,
     ) -> render.SceneRenderer:
-        """A window to draw in."""
+        """Renderer for this view; positions are translated by ``-shift`` [m]."""
         solids = [
             render.Solid(vertices - shift, prop.thing.faces, color=prop.color)
             for prop, vertices in zip(self.plain, self.others(0), strict=True)
@@ -92,7 +92,10 @@ class PressureView:
         return render.SceneRenderer(self._faces, camera, size=size, solids=solids, scale=self._scale, quality=quality)
 
     def at(self, frame: int, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Vertices [m] and pressures [Pa] at the frame of that place, of actors' vertices (V, 3)."""
+        """Vertices (n, 3) [m] and pressures (n,) [Pa] of the coloured surface at the ``frame``-th of the frames.
+
+        ``vertices`` are the concatenated vertices of all actors [m], shape (V, 3).
+        """
         number = float(self.crowd.frames[frame])
         solids = self.crowd.solid_vertices(frame)
         shown: list[tuple[str, NDArray[np.floating]]] = []
@@ -103,7 +106,7 @@ class PressureView:
         return np.concatenate(points), np.concatenate(values)
 
     def others(self, frame: int) -> list[NDArray[np.float64]]:
-        """Vertices of what is shown in its own colour."""
+        """Vertices of the objects in ``plain`` at the ``frame``-th of the frames [m]."""
         solids = self.crowd.solid_vertices(frame)
         return [solids[k] for k in self._plain]
 
@@ -114,7 +117,7 @@ class PressureView:
         return pressed.refined(name, faces, count)
 
     def _of_digits(self, name: str, surface: RefinedSurface, digits: Sequence[str]) -> NDArray[np.int32]:
-        """Faces of an actor's digits."""
+        """Faces of the chosen digits of an actor; all faces where none are chosen."""
         pressed = self.crowd.pressed
         hands = [] if pressed is None or not digits else [hand for hand in pressed.model.hands if hand.name == name]
         if not hands:

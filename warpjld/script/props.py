@@ -1,4 +1,4 @@
-"""Objects on the stage: where they are at any frame, and how they are drawn."""
+"""Objects of a scene: shape and placement at any frame, colour, surface for exports."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ if TYPE_CHECKING:
 __all__ = ["COLORS", "Prop", "prop_places", "prop_surface"]
 
 COLORS = ("#7fa3b8", "#c98b5a", "#8fae7c", "#b58bb0", "#c9b458", "#8a8f98")
-"""Colours of the objects that are given none, in turn."""
+"""Default colours of objects, used in turn."""
 
 
 @dataclass(eq=False)
 class Prop:
-    """An object on the stage.
+    """An object of a scene.
 
     Attributes:
-        name: Upper case.
-        thing: The object at its initial place.
+        name: Its name, in upper case.
+        thing: The object at its initial placement.
         color: ``#rrggbb``.
-        associations: Joints it follows.
-        placement: Keys of the object as a whole: from where the joints leave it, about its own origin.
-        shapes: Its shapes over time, where key frames deform it.
-        barred: Barr's deformations, where they do.
-        assumed: Unit that its file was taken to be in, since the script says none.
+        associations: Joints it is attached to, and when.
+        placement: Keys of the object as a whole, applied after the attachments, about its own origin.
+        shapes: Key-framed shapes, where it has them.
+        barred: Keys of Barr's deformations (taper, twist, bend), where it has them.
+        assumed: Unit that was assumed for its file because the script states none.
     """
 
     name: str
@@ -67,7 +67,8 @@ class Prop:
         return self.thing.vertices
 
     def barr(self, start: float = 0.0, motion: RigidMotion | None = None) -> Barr:
-        """Its deformed shape, in its own frame unless it has a motion; time is in frames from ``start``."""
+        """Obstacle deformed by Barr's formulas, in the object's frame unless ``motion`` is given; time in frames from
+        ``start``."""
         from warpjld.fem.contact.obstacles.barr import Barr
 
         barred = self.barred
@@ -89,12 +90,19 @@ class Prop:
 
 
 def prop_places(actors: Mapping[str, Actor], rate: float, prop: Prop, frames: NDArray[np.float64]) -> Places:
-    """Where an object is at F frames (R70–R72), its own keys put on top, of actors at ``rate`` frames a second."""
+    """Placements of an object at F frames: attachments to joints (R70–R72), then its own keys.
+
+    Args:
+        actors: Actors by name.
+        rate: Rate of the scene [1/s].
+        prop: The object.
+        frames: Frame numbers, shape (F,).
+    """
 
     def basis(association: Association, at: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         actor = actors[association.actor]
         blocks = [at[k : k + BLOCK] for k in range(0, max(len(at), 1), BLOCK)]
-        found = [joint_basis(actor.skeleton, stage(actor, some, rate), association.joint) for some in blocks]
+        found = [joint_basis(actor.skeleton, stage(actor, block, rate), association.joint) for block in blocks]
         origins, bases = zip(*found, strict=True)
         return np.concatenate(origins), np.concatenate(bases)
 

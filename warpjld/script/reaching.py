@@ -1,4 +1,4 @@
-"""REACH: an arm brings its hand to a place, and the body stays where it is (A §7, R90)."""
+"""REACH: inverse kinematics of an arm with a fixed trunk, avoiding the body; sets the arm's keys (A §7, R90)."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ if TYPE_CHECKING:
 __all__ = ["REACHED", "Goal", "arm_to_hand", "key_arm", "nearest_side", "pierced_frames", "reach_for"]
 
 REACHED = 0.002
-"""Distance up to which a place is reached [m]."""
-_ROUNDS = 4  # solutions, each with the skin where the one before has it
-_SETTLED = 2e-4  # change of the skin's place on the hand that ends them [m]
-_LOOKS = 7  # frames on the way at which it is looked whether the arm passes through the body
+"""Distance up to which a goal counts as reached [m]."""
+_ROUNDS = 4  # largest number of solutions; each uses the skin's offset from the previous one
+_SETTLED = 2e-4  # change of the skin's offset from the wrist at which the iteration ends [m]
+_LOOKS = 7  # frames of the motion at which intersections of the arm with the body are looked for
 
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Where a hand is to come.
+    """Goal of a reach.
 
     Attributes:
-        name: Of the object or ``(x, y, z)``, for messages.
+        name: Name of the object, or ``(x, y, z)``, for messages.
         object: Name of the object; empty for a point.
-        place: [m], shape (3,).
-        look: Where the palm is to look, a unit direction; None: anywhere.
-        part: What of the hand is to come there: ``palm``, ``wrist``, or a digit's pad (``index``).
+        place: World position to reach [m], shape (3,).
+        look: Wanted palm normal, a unit vector; None: any.
+        part: Part of the hand that reaches: ``palm``, ``wrist``, or the pad of a digit (``index``).
     """
 
     name: str
@@ -52,7 +52,7 @@ class Goal:
 
 
 def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, goal: Goal) -> Attempt:
-    """Find the arm's angles at ``last`` and set keys: the arm as it was at ``first``, the hand at the goal at ``last``.
+    """Find the arm's angles at ``last`` and set keys: the present angles at ``first``, those found at ``last``.
 
     Raises:
         InputError: No arm, or an actor that a motion file drives.
@@ -72,7 +72,7 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     short = float(np.linalg.norm(at - goal.place))
     pierced = pierced_frames(scene, actor, covering, arm, first, last)
     if _on_the_way(pierced, last):
-        # round the body: half-way the arm goes where it would be, but clear of it
+        # a key half-way moves the arm out of the body
         middle = 0.5 * (first + last)
         poses, angles = posture(scene, actor, middle)
         key_arm(scene, actor, arm, middle, clear(arm, angles[0], poses, arm.values(angles[0]), clearance))
@@ -85,14 +85,14 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
         "palm_off_degrees": round(math.degrees(found.off), 2),
         "pierced_faces": {f"{frame:g}": count for frame, count in pierced.items() if count},
     }
-    message = _told(goal, short, found, pierced, last)
+    message = _message(goal, short, found, pierced, last)
     if status != "CONVERGED":
         scene.warned([f"{actor.name}: REACH {goal.name} at frame {last:g}: {message}"])
     return Attempt(f"REACH {goal.name}", last, actor.name, goal.object, status, message, values)
 
 
 def key_arm(scene: Scene, actor: Actor, arm: Arm, frame: float, values: NDArray[np.float64]) -> None:
-    """Set keys of all the angles that move an arm."""
+    """Set keys of all free angles of an arm [rad]."""
     for (k, column), value in zip(arm.free.tolist(), values.tolist(), strict=True):
         actor.set_keys(f"{actor.skeleton.names[arm.joints[k]]}.{CHANNELS[column]}", [frame], value, scene.spline)
 
@@ -100,7 +100,7 @@ def key_arm(scene: Scene, actor: Actor, arm: Arm, frame: float, values: NDArray[
 def pierced_frames(
     scene: Scene, actor: Actor, covering: Covering, arm: Arm, first: float, last: float
 ) -> dict[float, int]:
-    """How many faces of the body an arm passes through, by frame."""
+    """Number of faces of the body that an arm passes through, by frame."""
     from warpjld.grasp.arm_clearance import pierced_faces
 
     frames = np.linspace(first, last, _LOOKS)
@@ -115,8 +115,19 @@ def _on_the_way(pierced: dict[float, int], last: float) -> list[float]:
 def arm_to_hand(
     scene: Scene, actor: Actor, arm: Arm, clearance: ArmClearance, frame: float, hand: Poses
 ) -> tuple[Reached, int]:
-    """The arm's posture at a frame that brings the hand where another pose of the same skeleton has it (one frame), and
-    how many faces of the body it passes through."""
+    """Posture of the arm at a frame that gives the hand its position and rotation in another pose.
+
+    Args:
+        scene: The scene.
+        actor: The body.
+        arm: Its arm.
+        clearance: Penetration depths of the arm in the body.
+        frame: The frame.
+        hand: Pose of the same skeleton with the hand as wanted, one frame.
+
+    Returns:
+        The posture, and the number of faces of the body that the arm passes through.
+    """
     from warpjld.geometry.rotations import matrices
     from warpjld.grasp.arm_clearance import pierced_faces
     from warpjld.skeleton.reach import Target, reach
@@ -137,7 +148,7 @@ def arm_to_hand(
 def nearest_side(
     scene: Scene, actor: Actor, side: str, prop: Prop, key: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The point of an object that lies nearest to a shoulder [m], and where a palm looks that lies on it there."""
+    """Point of an object nearest to a shoulder [m], and the unit direction from the shoulder to it."""
     from trimesh.triangles import closest_point
 
     poses, _ = posture(scene, actor, key)
@@ -160,8 +171,10 @@ def _solved(
     goal: Goal,
     clearance: ArmClearance,
 ) -> tuple[Reached, NDArray[np.float64]]:
-    """The arm's posture and where it brings the part of the hand [m]: skin slides a little on bones, so the offset of
-    the skin from the wrist is taken anew from the posture found."""
+    """Posture of the arm, and the position that the part of the hand then has [m], shape (3,).
+
+    The skin's offset from the wrist depends on the posture; it is updated in a fixed-point iteration.
+    """
     from warpjld.grasp.digits import pad_vertex
     from warpjld.grasp.palm import palm_of
     from warpjld.skeleton.reach import Target, reach
@@ -195,7 +208,8 @@ def _solved(
     return found, part_of(body)
 
 
-def _told(goal: Goal, short: float, found: Reached, pierced: dict[float, int], last: float) -> str:
+def _message(goal: Goal, short: float, found: Reached, pierced: dict[float, int], last: float) -> str:
+    """Readable text about the result of a reach."""
     if short > REACHED:
         text = f"out of reach: the {goal.part} comes within {1e3 * short:.0f} mm of it; the nearest posture is keyed"
     else:

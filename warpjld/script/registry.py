@@ -1,12 +1,12 @@
-"""The commands that exist: ours, those of installed packages, and those a script's author adds in Python (R88).
+"""Registry of commands: built-in ones, those of installed packages, and those that users add in Python (R88).
 
 A command is a function of the scene and its arguments::
 
     @command("SNAP", syntax="SNAP <LEFT/RIGHT> <key>", help="Snap thumb and middle finger at a key.")
     def snap(scene: Scene, arguments: Arguments) -> None: ...
 
-An installed package makes its commands known by an entry point in the group ``warpjld.commands`` that names a module
-(or anything inside one) whose import runs such decorators.
+An installed package registers its commands by an entry point in the group ``warpjld.commands`` that names a module
+(or an object in one) whose import runs such decorators.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ __all__ = [
 
 ENTRY_POINTS = "warpjld.commands"
 GROUPS = ("Actors", "Animation", "Grasping", "Contact", "Covering", "Output", "Flow")
-"""Headings of our own commands, in the order in which the table of commands prints them."""
+"""Groups of the built-in commands, in the order of the table of commands."""
 
 NOTES = {
     "Animation": (
@@ -48,23 +48,23 @@ NOTES = {
         "The words of a command may stand in any order before its numbers."
     ),
     "Contact": (
-        "Objects that are not PHYSICAL push and are not pushed: rigid ones, those from animated surfaces, those that "
-        "DEFORM changes. Displacements and deformations take keys as angles do, `AT <key>` included."
+        "Objects that are not PHYSICAL act as obstacles and are not moved by contact: rigid ones, animated surfaces, "
+        "those changed by DEFORM. Displacements and deformations take keys as angles do, `AT <key>` included."
     ),
     "Flow": (
-        "`MACRO <name> <parameter> … END` around lines makes a command of them; inside, `$parameter` stands for what "
-        "the call gives, also in quoted texts. Numbers may be arithmetic in parentheses: `($start + 2 * 5)`. "
-        "`#` begins a comment. Capitals and small letters are the same."
+        "`MACRO <name> <parameter> … END` defines a command from the lines between; inside, `$parameter` is replaced "
+        "by the argument of the call, also in quoted texts. Numbers may be arithmetic in parentheses: "
+        "`($start + 2 * 5)`. `#` begins a comment. Upper and lower case are the same."
     ),
 }
-"""What the tables of commands say about a group beside its commands."""
+"""Notes on a group of commands, printed above its table."""
 
 RESERVED = (
     *("MACRO", "END"),
-    # a line that begins with one of these goes on with the command above it
+    # a line that begins with one of these continues the command above it
     *("LEFT", "RIGHT", "FLEXION", "PIVOT", "TWISTING", "ABDUCTION", "KNUCKLES2", "KNUCKLES3"),
 )
-"""Words that no command and no macro may be called by."""
+"""Words that cannot be names of commands or macros."""
 
 _BUILT_IN = (
     "actors",
@@ -97,8 +97,8 @@ class Command:
         name: Upper case, one word.
         syntax: One line: keywords in capitals, ``<value>``, ``[optional]``, ``A/B`` for a choice.
         help: One sentence.
-        group: Heading it is listed under.
-        run: What it does to the scene.
+        group: Group it is listed under.
+        run: Function that executes it.
     """
 
     name: str
@@ -121,7 +121,7 @@ class Registry:
         return name.upper() in self._commands
 
     def __getitem__(self, name: str) -> Command:
-        """The command of that name, whatever its case.
+        """The command of that name, in any case.
 
         Raises:
             InputError: There is none; suggests the nearest.
@@ -142,13 +142,13 @@ class Registry:
         old = self._commands.get(new.name)
         same = old and (old.run.__module__, old.run.__qualname__) == (new.run.__module__, new.run.__qualname__)
         if new.name in RESERVED:
-            raise InputError(f"{new.name} is a word of the language: no command can be called so")
+            raise InputError(f"{new.name} is a word of the language: choose another name for the command")
         if old and not same:
             raise InputError(f"there is a command {new.name} already")
         self._commands[new.name] = new
 
     def remove(self, name: str) -> None:
-        """Forget a command."""
+        """Remove a command."""
         del self._commands[self[name].name]
 
 
@@ -160,10 +160,10 @@ def command(name: str, *, syntax: str, help: str, group: str = "User") -> Callab
     """Decorator: add a command to the language.
 
     Args:
-        name: The word that calls it, any case.
-        syntax: One line for tables and error messages.
-        help: One sentence for tables.
-        group: Heading to list it under.
+        name: The word that calls it, in any case.
+        syntax: One line, shown in tables and error messages.
+        help: One sentence, shown in tables.
+        group: Group to list it under.
 
     Raises:
         InputError: There is a command of that name already.
@@ -187,7 +187,7 @@ def command(name: str, *, syntax: str, help: str, group: str = "User") -> Callab
 
 
 def all_commands() -> Registry:
-    """All commands: ours, then those of installed packages. One that cannot be loaded is warned of and left out."""
+    """All commands: built-in ones, then those of installed packages; one that cannot be loaded causes a warning."""
     global _loaded
     for module in _BUILT_IN:
         importlib.import_module(f"warpjld.script.commands.{module}")

@@ -1,4 +1,4 @@
-"""A script from a file, and everything it asks for made: what ``warpjld run`` does, as a function."""
+"""Running a script file and making its outputs: the function behind ``warpjld run``."""
 
 from __future__ import annotations
 
@@ -26,25 +26,26 @@ def run_script(
     say: Callable[[str], None] = print,
     progress: Report = lambda what, done, total: None,
 ) -> dict[str, Any]:
-    """Run a script and make the pictures, films, exports and tables it asks for; if it asks for none, an animated
-    surface (NPZ), a film and a contact sheet.
+    """Run a script and write the pictures, films, exports and tables that it specifies.
+
+    If it specifies none, an animated surface (NPZ), a film and a contact sheet are written.
 
     Args:
-        script: File of commands (A §9).
+        script: Script file (A §9).
         out: Output folder; made if missing. Files appear in it when all that can be made are complete.
         commands: Python files that add commands (see ``command``).
-        check: Read the script and say what it would make; compute and write nothing.
-        page: Make a page (HTML) of the animation, too: it plays, and is turned with the mouse, in any browser.
+        check: Only check the script and list its outputs; compute and write nothing.
+        page: Also write the animation as an interactive HTML page for any browser.
         device: Warp device.
-        threads: CPU threads; None for as many as pay.
-        say: Where PRINT and SHOW write.
-        progress: Called with what is being done, how much of it is done, and how much there is.
+        threads: CPU threads; None: chosen automatically.
+        say: Function that receives the lines of PRINT and SHOW.
+        progress: Called with a stage's name, steps done and steps in total.
 
     Returns:
-        The summary, also written as ``summary.json``: plain values.
+        The summary, as JSON values; it is also written as ``summary.json``.
 
     Raises:
-        InputError: A command that is not understood or asks for what cannot be: names file, line and column.
+        InputError: A command that is not understood or cannot be carried out; names file, line and column.
         WarpjldError: Some output could not be made; all others are in the folder.
         MissingExtraError: A format needs an optional dependency.
 

@@ -1,4 +1,4 @@
-"""A scene made: all that can be wrong is looked at first, then everything it asks for is made."""
+"""Making the outputs of a scene: everything that can be checked is checked first, then the outputs are made."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ def run_scene(
     page: bool = False,
     progress: Report = lambda what, done, total: None,
 ) -> dict[str, Any]:
-    """Make everything a scene asks for; if it asks for nothing, an animated surface, a film and a contact sheet.
+    """Make the outputs of a scene; if there are none, an animated surface, a film and a contact sheet.
 
     Args:
-        scene: What the script described.
-        folder: Where to; made if missing. Files appear in it when all that can be made are complete.
-        script: Named in the summary.
+        scene: The scene.
+        folder: Output folder; made if missing. Files appear in it when all that can be made are complete.
+        script: The script file, which the summary names.
         device: Warp device of the covering.
-        threads: CPU threads of the covering; None leaves the choice to it.
+        threads: CPU threads of the covering; None: chosen automatically.
         dry: Check everything that can be checked, but compute and write nothing.
-        page: Make a page (HTML) of the animation, too, in the colours of pressure where contact is solved.
-        progress: Told about the work as it goes.
+        page: Also write the animation as an HTML page, coloured by pressure where contact is solved.
+        progress: Called with a stage's name, steps done and steps in total.
 
     Returns:
-        The summary, also written as ``summary.json``: plain values, see ``Summary``.
+        The summary, as JSON values, see ``Summary``; it is also written as ``summary.json``.
 
     Raises:
-        InputError: Nobody on stage, a key beyond a limit, a folder that cannot be written.
+        InputError: A scene without actors, a key beyond a limit, a folder that cannot be written.
         WarpjldError: Some output could not be made; all others are in the folder, and the summary names it.
         MissingExtraError: A format needs an optional dependency.
     """
     if not scene.props:
-        scene.actor()  # says what to do where there is none
+        scene.actor()  # raises an error with advice if there is none
     frames = frame_numbers(scene)
     summary = Summary(scene, frames, script, device)
     outputs = _wanted(scene, summary, page, script)
@@ -77,10 +77,8 @@ def run_scene(
         made = Making(scene, folder, frames, outputs, summary, device, threads, progress, script, keeping)
         content = made.all()
         unsolved = made.contact is not None and made.contact.verdict.failed
-        if made.failures.found and not unsolved:  # else contact is why, and the summary names what could not be made
-            raise WarpjldError(
-                f"not made: {'; '.join(made.failures.lines())}; all else that was asked for is in {folder}"
-            )
+        if made.failures.found and not unsolved:  # otherwise the error about contact is raised, which is the cause
+            raise WarpjldError(f"not made: {'; '.join(made.failures.lines())}; all other outputs are in {folder}")
         if made.contact is not None and made.contact.solved.interrupted:
             raise made.unsolved(made.contact)
     if made.contact is not None and unsolved:
@@ -89,7 +87,7 @@ def run_scene(
 
 
 def _wanted(scene: Scene, summary: Summary, page: bool, script: Path | None) -> list[Output]:
-    """What was asked for, or what a run makes by itself; tables of contact always."""
+    """The scene's outputs, or the default ones; with tables of contact where it is solved."""
     outputs = list(scene.outputs)
     if not outputs:
         outputs = [Export("surface.npz", None), ContactSheet("contact.png", (), scene.camera)]
@@ -108,7 +106,7 @@ def _wanted(scene: Scene, summary: Summary, page: bool, script: Path | None) -> 
 
 
 def _check_outputs(scene: Scene, outputs: list[Output], folder: Path, script: Path | None, count: int) -> None:
-    """Before anything is computed: formats, names, what stands in the way, room, lengths."""
+    """Check, before anything is computed: formats, names, files that would be overwritten, disk space, lengths."""
     check_available([output.name for output in outputs])
     for output in outputs:
         if isinstance(output, MotionFile):
@@ -123,6 +121,7 @@ def _check_outputs(scene: Scene, outputs: list[Output], folder: Path, script: Pa
 
 
 def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
+    """Names of all files that the outputs make."""
     names = []
     for output in outputs:
         if isinstance(output, Export | MotionFile):
@@ -135,7 +134,7 @@ def _names(scene: Scene, outputs: Sequence[Output]) -> list[str]:
 
 
 def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None:
-    """Refuse clips and rates that a format does not take."""
+    """Refuse numbers of frames and rates that a format does not support."""
     from warpjld.io.caches import open_cache
 
     for output in outputs:
@@ -151,7 +150,7 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
 
 
 def _size(scene: Scene, outputs: Sequence[Output], frames: int) -> float:
-    """About how many bytes the outputs are; films and pictures are small beside what is exported."""
+    """Estimated size of the outputs [bytes]; films are neglected."""
     size = 0.0
     for output in outputs:
         if isinstance(output, Export):

@@ -1,4 +1,4 @@
-"""What a script describes: actors and their motion, the camera, and the files to make."""
+"""The scene that a script builds: actors and their motion, objects, cameras, lamps, and the files to make."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = ["Actor", "Scene", "SplineConstants"]
 
 @dataclass(frozen=True)
 class SplineConstants:
-    """Kochanek–Bartels constants of the keys that follow (R3)."""
+    """Kochanek–Bartels constants of a key (R3)."""
 
     tension: float = 0.0
     continuity: float = 0.0
@@ -38,22 +38,22 @@ class SplineConstants:
 
 @dataclass(eq=False)
 class Actor:
-    """A rig on the stage.
+    """An actor: a rig in the scene, with its motion and settings.
 
     Attributes:
-        name: Upper case.
-        rig: As loaded.
-        skeleton: The rig's, with the script's flexion axes and limits.
-        motion: Keys given by the script.
-        parameters: The covering's.
-        method: The covering's.
+        name: Its name, in upper case.
+        rig: The rig as loaded.
+        skeleton: The rig's skeleton with the script's flexion axes and limits.
+        motion: Keys of joint angles set by the script.
+        parameters: Parameters of the covering.
+        method: Method of the covering.
         domains: Whether domains come from the geometry or from the rig's painted weights.
-        touch: Whether skin that crosses is parted, and digits are closed only until they touch.
-        recorded: Poses of a motion file and their rate [1/s], which the keys then do not override.
-        motion_notes: What a reader of the result should know of that file.
+        touch: Contact for display: whether skin is separated (``on``), and digits also stop at contact (``limit``).
+        recorded: Poses of a motion file and their rate [1/s], used instead of keys.
+        motion_notes: Notes on that file for the summary.
         placement: Keys of the actor as a whole.
-        color: Of its skin, ``#rrggbb``; None: the usual one.
-        covering: The surface as bound last; ``covered`` is the method and the domains it was bound with.
+        color: Colour of its skin, ``#rrggbb``; None: the default.
+        covering: The covering made last; ``covered`` is the method and domains it was made with.
     """
 
     name: str
@@ -77,13 +77,12 @@ class Actor:
         return bool(self.motion.tracks)
 
     def set_keys(self, channel: str, keys: Sequence[float], value: float, spline: SplineConstants) -> None:
-        """Set one value [rad] at several frames of a channel such as ``left.index.base.flexion``."""
+        """Set a value [rad] at several frames of a channel such as ``left.index.base.flexion``."""
         for key in keys:
             self.motion.set_key(channel, key, value, **asdict(spline))
 
     def value(self, channel: str, frame: float) -> float:
-        """Angle [rad] of a channel such as ``left.index.base.flexion`` at any frame; that at rest where it has no
-        key."""
+        """Angle [rad] of a channel such as ``left.index.base.flexion`` at any frame; the rest angle without keys."""
         joint, _, kind = channel.rpartition(".")
         initial = self.skeleton.initial[self.skeleton.names.index(joint), CHANNELS.index(kind)]
         return float(self.motion.value(channel, frame, initial))
@@ -96,7 +95,7 @@ class Actor:
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """First and last frame with a key, or of the recorded motion at its own rate."""
+        """First and last frame with a key or of the recorded motion (at its own rate); None without motion."""
         frames = self.key_frames
         if self.recorded is not None:
             frames = [*frames, 0.0, len(self.recorded[0]) - 1.0]
@@ -110,31 +109,32 @@ def _to_stderr(line: str) -> None:
 
 @dataclass(eq=False)
 class Scene:
-    """A stage with actors, a clock, a camera, and a list of files to make.
+    """Everything that a script describes: actors, objects, times, cameras, contact, and the files to make.
 
     Attributes:
-        actors: By name, in the order they came on stage.
+        actors: Actors by name, in the order they were added.
         props: Objects by name.
-        attempts: Searches and grasps made so far, for the summary.
-        contact: What is said about contact.
-        grips: Angles of an actor's digits before it closed them, by channel [rad].
-        current: The actor that commands without a side speak to.
-        first, last: Frames to make, both included; None: from the first key to the last.
-        rate: Frames a second.
-        spline: Constants for the keys that follow.
-        camera: For the outputs that follow.
+        attempts: Results of searches and grasps, for the summary.
+        contact: Specification of the contact simulation.
+        grips: Angles of an actor's digits before GRASP closed them, by actor and channel [rad].
+        current: Name of the actor that commands without an actor or side apply to.
+        first, last: Frames to compute, both included; None: from the first key to the last.
+        rate: Frames per second.
+        spline: Spline constants for the keys set next.
+        camera: Camera for the outputs added next.
         size: Width and height of pictures and films [pixels].
-        lamps: That stand on the stage, by name; none: studio light.
-        backdrop: Colours behind everything, below and above.
-        shots: Frames and their cameras, by name.
+        lamps: Lamps by name; none: default lighting.
+        backdrop: Background colours, below and above; None: default.
+        shots: Shots by name.
         outputs: Files to make, relative to the output folder.
-        asked: Where in a script they were asked for, by name.
+        asked: Position in a script of the command that added each output, by the output's name.
         folder: The output folder.
-        dry: Whether searches only leave their keys, without angles: what ``--check`` does.
-        read: Files that were read, which no output may take the place of.
-        within: Folders that files may be read from; None for anywhere.
-        say: Where PRINT and SHOW write.
-        warn: Told what is probably wrong with a rig or a motion, as it is met; ``warnings`` keeps it for the summary.
+        dry: Whether searches only set keys without computing angles, as ``--check`` does.
+        read: Files that were read, which outputs may not overwrite.
+        within: Folders that files may be read from; None: anywhere.
+        say: Function that receives the lines of PRINT and SHOW.
+        warn: Function that receives warnings about rigs and motions; ``warnings`` keeps them for the summary.
+        warnings: Warnings so far.
         device: Warp device of searches.
 
     Examples:
@@ -175,22 +175,22 @@ class Scene:
 
     def __repr__(self) -> str:
         counts = ((len(self.actors), "actor"), (len(self.props), "object"))
-        told = ", ".join(f"{n} {what}{'s' * (n != 1)}" for n, what in counts)
+        contents = ", ".join(f"{n} {what}{'s' * (n != 1)}" for n, what in counts)
         clock = f"frames {self.first} to {self.last} at {self.rate:g} a second"
-        return f"Scene({told}, {clock}, {len(self.outputs)} outputs)"
+        return f"Scene({contents}, {clock}, {len(self.outputs)} outputs)"
 
     def warned(self, lines: Iterable[str]) -> None:
-        """Tell warnings, and keep them."""
+        """Issue warnings and keep them for the summary."""
         for line in lines:
             self.warnings.append(line)
             self.warn(line)
 
     def may_read(self, path: Path) -> bool:
-        """Whether a file lies in a folder that files may be read from."""
+        """Whether a file may be read (see ``within``)."""
         return self.within is None or any(path.resolve().is_relative_to(allowed) for allowed in self.within)
 
     def add(self, name: str, rig: Rig) -> Actor:
-        """Bring a rig on stage; it becomes the current actor.
+        """Add a rig as an actor; it becomes the current actor.
 
         Raises:
             InputError: The name is taken.
@@ -227,12 +227,12 @@ class Scene:
             InputError: There is none.
         """
         if name.upper() not in self.props:
-            first = "" if self.props else "; bring one on with a line such as OBJECT APPLE BALL 0.07"
+            first = "" if self.props else "; add one with a line such as OBJECT APPLE BALL 0.07"
             raise InputError(f"there is no object {name}{did_you_mean(name, self.props)}{first}")
         return self.props[name.upper()]
 
     def placement(self, name: str) -> Placement:
-        """Keys of the actor or object of that name as a whole.
+        """Placement keys of the actor or object of that name.
 
         Raises:
             InputError: There is none.
@@ -244,7 +244,7 @@ class Scene:
         raise InputError(f"there is no actor or object {name}{did_you_mean(name, [*self.actors, *self.props])}")
 
     def actor_with(self, side: str) -> Actor:
-        """The actor whose left or right limbs are meant: the current one if it has any, else the only one that has.
+        """The actor with limbs on a side: the current one if it has that side, else the only other one that has.
 
         Raises:
             InputError: None has, or several have and none of them is the current one.
@@ -259,7 +259,7 @@ class Scene:
         if others:
             names = ", ".join(actor.name for actor in others)
             raise InputError(f"several actors have a {side} side ({names}); choose one with ACTOR")
-        raise InputError(f"no actor has a {side} side; bring one on with HAND {side.upper()} BUILTIN")
+        raise InputError(f"no actor has a {side} side; add one with HAND {side.upper()} BUILTIN")
 
 
 def _has_side(actor: Actor, side: str) -> bool:

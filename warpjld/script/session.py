@@ -1,4 +1,4 @@
-"""A conversation in the command language: lines come one by one, a macro may take several."""
+"""Interactive session in the command language: lines run one by one, with undo, save and autosave."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from warpjld.skeleton import CHANNELS, DIGITS
 __all__ = ["AUTOSAVED", "Session"]
 
 AUTOSAVED = "autosaved.jld"
+"""Name of the file that keeps lines which were not saved."""
 
 _OWN = ("RUN", "SAVE", "UNDO", "QUIT", "EXIT")
 
@@ -27,12 +28,12 @@ _OWN = ("RUN", "SAVE", "UNDO", "QUIT", "EXIT")
 class Session:
     """Runs typed lines on a scene.
 
-    Besides the language's commands it knows ``RUN`` (make the files), ``SAVE "name.jld"`` (keep what was typed),
-    ``UNDO`` (forget the last line) and ``QUIT``.
+    Besides the commands of the language it has ``RUN`` (make the files), ``SAVE "name.jld"`` (save the lines typed),
+    ``UNDO`` (undo the last line) and ``QUIT``.
 
     Attributes:
-        scene: What the lines have described so far.
-        unfinished: Whether a MACRO waits for its END.
+        scene: The scene that the lines have built so far.
+        unfinished: Whether a MACRO still lacks its END.
     """
 
     def __init__(
@@ -56,11 +57,11 @@ class Session:
 
     @property
     def unfinished(self) -> bool:
-        """Whether a MACRO waits for its END."""
+        """Whether a MACRO still lacks its END."""
         return bool(self._pending)
 
     def names(self) -> list[str]:
-        """Words worth completing."""
+        """Words for completion at the prompt."""
         keywords = {
             "LEFT",
             "RIGHT",
@@ -79,16 +80,16 @@ class Session:
         return sorted(keywords | commands | set(_OWN) | set(self._interpreter.macros) | set(self.scene.actors) | joints)
 
     def run_file(self, path: Path) -> None:
-        """Run a script; what is typed comes after it."""
+        """Run a script before the first typed line."""
         parse_file(path)
         self._script = path
         self._interpreter.run_file(path)
 
     def type(self, line: str) -> bool:
-        """Run a line; False when it says to quit.
+        """Run a line; False if it was QUIT or EXIT.
 
         Raises:
-            WarpjldError: The line is wrong; nothing of it was kept.
+            WarpjldError: The line failed; all its effects were undone.
         """
         text = "\n".join([*self._pending, line])
         before = self._typed - len(self._pending)
@@ -110,7 +111,7 @@ class Session:
             moment = moment_of(self._interpreter)
             try:
                 self._interpreter.execute(nodes, None)
-            except BaseException:  # whatever of the line has happened is taken back
+            except BaseException:  # undo the partial effects of the line
                 self._back_to(moment)
                 raise
             self._before.append(moment)
@@ -118,8 +119,11 @@ class Session:
         return True
 
     def autosave(self) -> Path | None:
-        """Keep what was typed and not saved, in the output folder, beside what other sessions left there; None where
-        there is nothing to keep, or it cannot be written."""
+        """Write the lines that were not saved to a new file in the output folder.
+
+        Returns:
+            Its path; None if there is nothing to save or the file cannot be written.
+        """
         if self._kept == self._saved:
             self._forget()
             return None
@@ -133,17 +137,17 @@ class Session:
         return self._autosaved
 
     def _forget(self) -> None:
-        """Remove what was kept of lines that are saved, or gone."""
+        """Remove the autosaved file, when its lines are saved or undone."""
         if self._autosaved is not None:
             with suppress(OSError):
                 self._autosaved.unlink(missing_ok=True)
             self._autosaved = None
 
     def end(self) -> None:
-        """The input is over.
+        """End of the input.
 
         Raises:
-            InputError: Inside a MACRO.
+            InputError: A MACRO lacks its END.
         """
         if self._pending:
             raise InputError("this MACRO has no END", path="<shell>", line=self._typed)
@@ -156,7 +160,7 @@ class Session:
         name, arguments = statement.name.text.upper(), statement.arguments
         wanted = 1 if name == "SAVE" else 0
         if len(arguments) != wanted or (wanted and not isinstance(arguments[0], Text)):
-            raise statement.end.error('expected SAVE "<script>"' if wanted else f"{name} stands alone")
+            raise statement.end.error('expected SAVE "<script>"' if wanted else f"{name} takes no arguments")
         match name:
             case "RUN":
                 self._run()
@@ -179,8 +183,8 @@ class Session:
         try:
             self._write(path)
         except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-            said = error.strerror if isinstance(error, OSError) else error
-            raise name.position.error(f"cannot write '{path}': {said}") from error
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise name.position.error(f"cannot write '{path}': {reason}") from error
         self._saved = list(self._kept)
         self._say(str(path))
 
@@ -194,7 +198,7 @@ class Session:
             raise statement.name.position.error("nothing to undo")
         gone = self._kept.pop()
         self._back_to(self._before.pop())
-        self._say(f"forgotten: {gone}")
+        self._say(f"undone: {gone}")
 
     def _back_to(self, moment: Moment) -> None:
         self._interpreter = moment.resume()
@@ -208,5 +212,6 @@ def _places(folder: Path) -> Iterator[Path]:
 
 
 def _only_looks(nodes: tuple[Node, ...]) -> bool:
+    """Whether statements only print, so that there is nothing to undo."""
     looking = ("SHOW", "HELP", "PRINT")
     return all(isinstance(node, Statement) and node.name.text.upper() in looking for node in nodes)

@@ -1,4 +1,4 @@
-"""Texts for SHOW and HELP."""
+"""Texts of SHOW and HELP."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["actors", "command_listing", "joints", "parameter_listing", "values"]
 
 
 def values(actor: Actor, frame: float, rate: float) -> str:
-    """Angles of an actor's keyed joints, the whole's place and its joints' positions, at any frame (R4)."""
+    """Keyed joint angles, placement and joint positions of an actor at any frame (R4)."""
     from warpjld.script.staging import stage
 
     lines = [f"{actor.name} at frame {frame:g}"]
@@ -39,7 +39,7 @@ def values(actor: Actor, frame: float, rate: float) -> str:
 
 
 def actors(scene: Scene) -> str:
-    """One line per actor; the current one is starred."""
+    """One line per actor; the current one is marked by a star."""
     lines = []
     for actor in scene.actors.values():
         star = "*" if actor.name == scene.current else " "
@@ -52,8 +52,7 @@ def actors(scene: Scene) -> str:
 
 
 def joints(actor: Actor) -> str:
-    """An actor's joints with the number JOINT understands, and limits [degrees], closed channels left out,
-    and the angles at rest that are not 0."""
+    """An actor's joints with their numbers for JOINT, limits of movable channels and nonzero rest angles [degrees]."""
     lines = []
     numbers = {joint: str(number) for number, joint in joint_numbers(actor.skeleton).items()}
     for joint, name in enumerate(actor.skeleton.names):
@@ -67,7 +66,7 @@ def joints(actor: Actor) -> str:
 
 
 def parameter_listing(actor: Actor) -> str:
-    """An actor's parameters, one joint a line."""
+    """An actor's parameters, one line per joint."""
     names = [field.name for field in fields(actor.parameters)]
     lines = [f"{'':<36} " + " ".join(f"{name:>12}" for name in names)]
     for joint, name in enumerate(actor.skeleton.names):

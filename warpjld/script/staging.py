@@ -1,4 +1,4 @@
-"""Actors at frames: keys or recorded motion → poses on the stage."""
+"""Poses of actors at frames, from keys or recorded motion, in world space."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["frame_numbers", "held", "notes", "stage", "staged"]
 
 
 def frame_numbers(scene: Scene) -> NDArray[np.float64]:
-    """The frames to make: FRAMES, or from the first to the last key of all actors and objects; shape (F,).
+    """Frames to compute: as FRAMES says, or from the first to the last key of all actors and objects, shape (F,).
 
     Raises:
-        InputError: More than the limit ``frames`` allows.
+        InputError: More frames than the limit ``frames`` allows.
     """
     if scene.first is not None and scene.last is not None:
         return _range(scene.first, scene.last)
@@ -44,7 +44,7 @@ def _range(first: float, last: float) -> NDArray[np.float64]:
 
 
 def stage(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
-    """Poses of an actor at any frames, whole or not, of a scene with that rate [1/s]."""
+    """Poses of an actor at frames (F,), fractions allowed, of a scene with a rate [1/s]."""
     if actor.recorded is None:
         poses = actor.motion.poses(actor.skeleton, frames)
     else:
@@ -54,12 +54,12 @@ def stage(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
 
 
 def staged(actor: Actor, frames: NDArray[np.float64], rate: float) -> Poses:
-    """As ``stage``, of so many frames that their poses are computed a block at a time, when they are looked at."""
-    return streamed(frames, lambda some: stage(actor, some, rate))
+    """As ``stage``, for many frames: poses are computed lazily, block by block."""
+    return streamed(frames, lambda block: stage(actor, block, rate))
 
 
 def notes(actor: Actor, frames: NDArray[np.float64]) -> list[str]:
-    """What a reader of the result should know of an actor's rig and motion."""
+    """Notes on an actor's rig and motion for the summary."""
     found = [f"{actor.name}: {note}" for note in (*actor.rig.notes, *actor.motion_notes)]
     if actor.recorded is None:
         found += [f"{actor.name}: {held}" for held in actor.motion.clamped(frames, actor.skeleton)]
@@ -67,7 +67,7 @@ def notes(actor: Actor, frames: NDArray[np.float64]) -> list[str]:
 
 
 def held(actor: Actor, frames: NDArray[np.float64], rate: float) -> list[str]:
-    """Warnings of frames that a motion file does not reach, in which its first or last pose is held."""
+    """Warnings about frames outside a motion file's range, at which its first or last pose is held."""
     if actor.recorded is None:
         return []
     recorded, own_rate = actor.recorded

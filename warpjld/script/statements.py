@@ -1,4 +1,4 @@
-"""What a script says, with the place of every word: plain records the parser makes and the interpreter reads."""
+"""Syntax tree of scripts: statements and arguments with their positions."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Position:
-    """A place in a script: 1-based line and column; ``path`` is the file, or a name in angle brackets."""
+    """Position in a script: 1-based line and column; ``path`` is the file, or a name in angle brackets."""
 
     path: str
     line: int
     column: int
 
     def error(self, message: str) -> InputError:
-        """An error at this place, to be raised."""
+        """An error located here, to be raised."""
         return InputError(message, path=self.path, line=self.line, column=self.column)
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number, or what an expression came to."""
+    """A number, literal or the value of an expression."""
 
     value: float
     position: Position
@@ -49,7 +49,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Word:
-    """A bare word: a keyword, a name."""
+    """An unquoted word: a keyword or a name."""
 
     text: str
     position: Position
@@ -60,7 +60,7 @@ class Word:
 
 @dataclass(frozen=True)
 class Text:
-    """A quoted text: a file name, a message. ``$name`` inside is replaced in a macro."""
+    """A quoted text: a file name, a message. ``$name`` in it is replaced inside macros."""
 
     text: str
     position: Position
@@ -71,7 +71,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Reference:
-    """``$name``: an argument of the macro it stands in."""
+    """``$name``: a parameter of the enclosing macro."""
 
     name: str
     position: Position
@@ -79,7 +79,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Operation:
-    """Arithmetic in parentheses; a sign is 0 - x."""
+    """Binary arithmetic operation; the sign in −x is the operation 0 − x."""
 
     operator: str
     left: Expression
@@ -94,7 +94,7 @@ Argument = Value | Reference | Operation
 
 @dataclass(frozen=True)
 class Statement:
-    """A command and its arguments; ``end`` is just behind the last one."""
+    """A command and its arguments; ``end`` is the position after the last one."""
 
     name: Word
     arguments: tuple[Argument, ...]

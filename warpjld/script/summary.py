@@ -1,4 +1,4 @@
-"""What a run made: one dictionary for people, for ``summary.json`` and for ``--json``."""
+"""Summary of a run: one dictionary, printed, written as ``summary.json``, and output by ``--json``."""
 
 from __future__ import annotations
 
@@ -22,18 +22,19 @@ from warpjld.script.scene import Scene
 __all__ = ["NAME", "Summary", "table"]
 
 NAME = "summary.json"
+"""File name of the summary in the output folder."""
 
 
 @dataclass
 class Summary:
-    """Filled while a scene is made.
+    """Collects the summary while the outputs of a scene are made.
 
     Attributes:
-        seconds: Time of each stage.
-        press: How a contact solve ended, if there was one.
-        contacts: What touches which object, by frame.
-        failed: Outputs that could not be made, and why.
-        notes: What was guessed, held at a limit, left out or looks suspicious.
+        seconds: Wall time of each stage [s].
+        press: Verdict of the contact simulation, if there was one.
+        contacts: Contacts with objects, by frame.
+        failed: Outputs that could not be made, with the error.
+        notes: What was guessed, clamped to a limit, left out or looks suspicious.
     """
 
     scene: Scene
@@ -48,7 +49,7 @@ class Summary:
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
-        """Counts the time of a stage."""
+        """Context that adds to the time of a stage."""
         start = time.perf_counter()
         try:
             yield
@@ -63,7 +64,7 @@ class Summary:
         return content
 
     def content(self, files: Sequence[dict[str, Any]], folder: Path) -> dict[str, Any]:
-        """Everything as plain values."""
+        """The summary as JSON values."""
         return {
             "warpjld": __version__,
             "script": None if self.script is None else str(self.script),
@@ -108,7 +109,7 @@ class Summary:
 
 
 def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
-    """Say a summary to people."""
+    """Print a summary in readable form."""
     from rich.console import Console
 
     console = Console(highlight=False, markup=False, soft_wrap=True)
@@ -137,7 +138,7 @@ def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
         count = f"{frames['count']} frames ({frames['first']} to {frames['last']}) at {content['rate']:g}/s"
         console.print(f"{count}: {spent}" if spent else count)
         sizes = {f"{content['folder']}/{name}": size for name, size in _grouped(content["files"])}
-        width = max(map(len, sizes), default=0)  # a table would shorten paths that are wider than the terminal
+        width = max(map(len, sizes), default=0)  # not a rich table, which would truncate paths wider than the terminal
         for path, size in sizes.items():
             console.print(f"{path:{width}}  {'to be made' if size is None else _readable(size)}")
         for note in content["notes"]:
@@ -146,7 +147,7 @@ def table(content: dict[str, Any], say: Callable[[str], None] = print) -> None:
 
 
 def _grouped(files: list[dict[str, Any]]) -> list[tuple[str, float | None]]:
-    """Files by name and size; the many files of a sequence as one line."""
+    """Files by name and size; the files of a sequence as one entry."""
     groups: dict[str, list[dict[str, Any]]] = {}
     for file in files:
         groups.setdefault(re.sub(r"\d{4,}(?=\.\w+$)", "####", file["name"]), []).append(file)

@@ -1,5 +1,5 @@
-"""A studio in the browser: a script made with mouse and keyboard, seen as it is made.
+"""The studio: an editor for scripts in the browser, with a 3D view of the scene that the script describes.
 
-``state`` holds all there is: a document (the script), the scene it describes, a frame. It knows nothing of browsers.
-``panels`` show it by viser, and change it by nothing but edits of the document.
+``state`` is the model, independent of browsers: a document (the script), its scene, the current frame, a selection.
+``panels`` are the views, made with viser; they change the state only by edits of the document.
 """

@@ -1,4 +1,4 @@
-"""Work that takes long, beside the studio's own thread: with progress, and an end when it is cancelled."""
+"""Long-running work in a background thread, with progress and cancellation."""
 
 from __future__ import annotations
 

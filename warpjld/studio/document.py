@@ -1,4 +1,4 @@
-"""The text of a script, and the history of its edits: all that a studio keeps."""
+"""The script as a document: its text, undo history, saving and autosaving."""
 
 from __future__ import annotations
 
@@ -12,28 +12,27 @@ from warpjld.files.whole_file import whole_file
 
 __all__ = ["ScriptDocument"]
 
-_TOGETHER = 1.0  # seconds within which edits of one kind are one step of undoing
-_MOST_STEPS = 1000
+_TOGETHER = 1.0  # time within which edits of one kind are merged into one undo step [s]
+_MOST_STEPS = 1000  # length of the undo history
 
 
 @dataclass(frozen=True)
 class _Step:
-    """The text before an edit, and what kind of edit it was."""
+    """Undo step: the text before an edit, and the edit's kind."""
 
     before: str
     kind: Hashable
 
 
 class ScriptDocument:
-    """A script being written.
+    """A script with its undo history.
 
-    Edits of one ``kind`` that follow one another closely (a slider being dragged, a word being typed) are undone
-    together.
+    Consecutive edits of one ``kind`` within a second (a slider being dragged, a word being typed) are one undo step.
 
     Attributes:
-        path: The file that it is saved to; names of files inside it are relative to that file's folder.
+        path: The file that it is saved to; file names in the script are relative to that file's folder.
         text: The script.
-        saved: The text as the file has it.
+        saved: The text in the file.
     """
 
     def __init__(self, path: Path, text: str = "", *, clock: Callable[[], float] = time.monotonic) -> None:
@@ -47,7 +46,7 @@ class ScriptDocument:
 
     @classmethod
     def open(cls, path: Path) -> ScriptDocument:
-        """The script in a file (UTF-8).
+        """Read a script from a file (UTF-8).
 
         Raises:
             InputError: It cannot be read.
@@ -56,16 +55,16 @@ class ScriptDocument:
 
     @property
     def changed(self) -> bool:
-        """Whether the file does not have the text as it is."""
+        """Whether the text differs from the file."""
         return self.text != self.saved
 
     @property
     def can_redo(self) -> bool:
-        """Whether an edit was undone last."""
+        """Whether an undone edit can be redone."""
         return bool(self._redo)
 
     def edit(self, text: str, kind: Hashable = None) -> None:
-        """Replace the text; None as the kind is a step of its own."""
+        """Replace the text; an edit of kind None is never merged with another."""
         if text == self.text:
             return
         now = self._clock()
@@ -83,15 +82,15 @@ class ScriptDocument:
         self.edit(f"{body}\n{lines}\n" if body else f"{lines}\n", kind)
 
     def undo(self) -> bool:
-        """Take the last step back; False where there is none."""
+        """Undo the last step; False if there is none."""
         return self._swap(self._undo, self._redo)
 
     def redo(self) -> bool:
-        """Take the last undone step again; False where there is none."""
+        """Redo the last undone step; False if there is none."""
         return self._swap(self._redo, self._undo)
 
     def save(self, path: Path | None = None) -> Path:
-        """Write the file, whole or not at all; with a path, that file from now on."""
+        """Write the file atomically; a path changes the document's file."""
         self.path = self.path if path is None else path
         self._write(self.path)
         self.saved = self.text
@@ -99,11 +98,11 @@ class ScriptDocument:
 
     @property
     def autosaved(self) -> Path:
-        """Where ``autosave`` keeps the text."""
+        """File that ``autosave`` writes."""
         return self.path.with_name(f".{self.path.name}.autosaved")
 
     def autosave(self) -> None:
-        """Keep the text beside the file as long as the file does not have it."""
+        """Write the text to ``autosaved`` if it is not saved, else remove that file."""
         if self.changed:
             self._write(self.autosaved)
         else:

@@ -1,4 +1,4 @@
-"""What a command's form asks for on this stage, and the line that it comes to."""
+"""Forms of commands and macros: ways to call them, known names, and initial values for the present scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from warpjld.studio.syntax import TextField, Way, ways_of
 __all__ = ["first_value", "known_names", "ways_of_command", "ways_of_macro"]
 
 _FIRST, _LAST = ("key", "key1", "frame", "first", "start"), ("key2", "last", "other key", "stop")
-_LONG = 20.0  # frames from one to the other
+_LONG = 20.0  # default distance between the first and the second key of a form [frames]
 
 
 def ways_of_command(command: Command) -> tuple[Way, ...]:
@@ -24,7 +24,7 @@ def ways_of_macro(macro: MacroDefinition) -> tuple[Way, ...]:
 
 
 def known_names(field: TextField, scene: Scene) -> list[str]:
-    """Names on stage that a value may be; empty where it may be anything."""
+    """Names in the scene that a field may take; empty if any text is allowed."""
     actors, objects = [*scene.actors], [*scene.props]
     match field.label:
         case "actor or object":
@@ -41,7 +41,7 @@ def known_names(field: TextField, scene: Scene) -> list[str]:
 
 
 def first_value(field: TextField, frame: float) -> float:
-    """What a number is before it is typed: the frame that is shown, where it is a frame, or one a while later."""
+    """Initial value of a number: the current frame for a first key, a later one for a second key, else a default."""
     if field.label in _LAST:
         return frame + _LONG
     return frame if field.label in _FIRST else 0.0

@@ -1,4 +1,4 @@
-"""A hand's pose in a few numbers: shares of a curl, a spread, an opposition and a cup."""
+"""Coarse controls of a hand's pose: amounts of curl, spread, opposition and cupping."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ COARSE: dict[str, dict[str, float]] = {
     "opposition": {"thumb.base.pivot": 30.0, "thumb.base.abduction": 26.0, "thumb.knuckle2.flexion": 20.0},
     "cup": {"ring.carpometacarpal.flexion": 14.0, "pinky.carpometacarpal.flexion": 20.0},
 }
-"""Degrees of a hand's channels at a share of one, by name."""
+"""For each control, the channels' angles [degrees] at amount 1; chosen by hand."""
 
 
 def coarse_angles(name: str, share: float, side: str) -> dict[str, float]:
-    """Degrees by channel of a hand at a share of 0…1."""
+    """Angles [degrees] by channel of a hand at an amount 0…1 of a control."""
     return {f"{side}.{channel}": share * degrees for channel, degrees in COARSE[name].items()}
 
 
 def coarse_share(name: str, angles: Mapping[str, float], side: str) -> float | None:
-    """The share that a pose is nearest to; None where the hand has none of the channels."""
+    """Amount of a control that fits a pose best; None if the hand has none of its channels."""
     there = {f"{side}.{c}": degrees for c, degrees in COARSE[name].items() if f"{side}.{c}" in angles}
     weight = sum(degrees**2 for degrees in there.values())
     if not weight:
@@ -40,16 +40,15 @@ def coarse_share(name: str, angles: Mapping[str, float], side: str) -> float | N
 
 
 def of_side(angles: Mapping[str, float], side: str) -> dict[str, float]:
-    """The channels of one side's digits and wrist, without its name: the other side's are the same for the mirrored
-    pose."""
+    """Channels of one side, without the side's name; equal angles on the other side give the mirrored pose."""
     return {name.partition(".")[2]: value for name, value in angles.items() if name.startswith(f"{side}.")}
 
 
 def on_side(angles: Mapping[str, float], side: str) -> dict[str, float]:
-    """Those channels on a side."""
+    """Inverse of ``of_side``: channels with the side's name."""
     return {f"{side}.{name}": value for name, value in angles.items()}
 
 
 def mixed(here: Mapping[str, float], there: Mapping[str, float], share: float) -> dict[str, float]:
-    """Angles a share of the way from one pose to another."""
+    """Linear interpolation between two poses; ``share`` 0 is ``here``, 1 is ``there``."""
     return {name: value + share * (there.get(name, value) - value) for name, value in here.items()}

@@ -1,4 +1,4 @@
-"""Values as lines of a script: set by replacing the number of a line at the end, or by a line more."""
+"""Editing of values in a script's text: replace a value in the last lines, or append a line."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _VALUE = re.compile(
 
 
 def with_values(text: str, values: Mapping[str, str], *, actor: str | None = None) -> str:
-    """A script with lines that set values.
+    """Script with lines that set values.
 
-    Lines of values that stand last in the script are edited in place, since nothing that follows could depend on them;
-    others are left as they are, and overruled by lines at the end.
+    Value lines at the end of the script are edited in place, since nothing after them can depend on them; values set
+    earlier are overridden by new lines at the end.
 
     Args:
         text: The script.
-        values: What stands behind the words that a line begins with, such as ``MOVE LEFT 20`` and ``0 0.1 0``.
-        actor: Name of the actor to speak to first, where it is not the current one.
+        values: Values by the beginning of their line, such as ``MOVE LEFT 20`` → ``0 0.1 0``.
+        actor: Name of the actor to select first, if it is not the current one.
     """
     lines = text.rstrip("\n").split("\n") if text.strip() else []
     if actor is not None:
@@ -42,7 +42,7 @@ def with_values(text: str, values: Mapping[str, str], *, actor: str | None = Non
 
 
 def with_keys(text: str, angles: Mapping[str, float], frame: float, *, actor: str | None = None) -> str:
-    """As ``with_values``, with keys of some channels, such as ``left.index.base.flexion``, at a frame [degrees]."""
+    """As ``with_values``, for keys [degrees] of channels such as ``left.index.base.flexion`` at a frame."""
     values = {}
     for name, degrees in angles.items():
         joint, _, channel = name.rpartition(".")
@@ -51,5 +51,5 @@ def with_keys(text: str, angles: Mapping[str, float], frame: float, *, actor: st
 
 
 def number(value: float, digits: int = 2) -> str:
-    """A number as a script has it, rounded to so many digits."""
+    """A number formatted for a script, rounded to ``digits`` decimals."""
     return f"{round(value, digits) + 0.0:.10g}"

@@ -1,4 +1,4 @@
-"""What a script asks for made, and its contact solved: on a scene of their own, beside the one that is edited."""
+"""Running a script and solving its contact in the background, on a copy of the scene."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Pressed:
     """A solved contact.
 
     Attributes:
-        text: The script that it is of.
-        scene: Its scene, with the keys that grips were found to have.
-        simulation: What came of it.
+        text: The script that was solved.
+        scene: Its scene, including keys that grip searches found.
+        simulation: The result.
     """
 
     text: str
@@ -35,14 +35,14 @@ class Pressed:
     simulation: Simulation
 
     def rows(self, frame: float) -> list[ContactRow]:
-        """What touches at the solved frame that is nearest."""
+        """Contacts at the nearest solved frame."""
         every = self.simulation.rows
         near = min({row.frame for row in every}, key=lambda one: abs(one - frame), default=frame)
         return [row for row in every if row.frame == near and row.force_n > 0.0]
 
 
 def pressed(text: str, scene: Scene, progress: JobProgress) -> Pressed:
-    """Do what PRESS asks for.
+    """Solve the contact that PRESS specifies.
 
     Raises:
         InputError: There is no PRESS, or bodies that cannot be meshed or driven.
@@ -54,5 +54,5 @@ def pressed(text: str, scene: Scene, progress: JobProgress) -> Pressed:
 
 
 def made(scene: Scene, script: Path, progress: JobProgress, device: str = "cpu") -> dict[str, Any]:
-    """Make the script's files in the output folder; the summary."""
+    """Write the script's files into the output folder; the summary."""
     return run_scene(scene, scene.folder, script=script, device=device, progress=progress)

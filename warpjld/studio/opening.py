@@ -1,4 +1,4 @@
-"""What a studio begins with: a script, a rig, or a hand."""
+"""Opening the studio with a script, a rig, or the built-in hand."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ _NEW = "HAND LEFT BUILTIN\n"
 
 
 def opened_document(path: Path | None, folder: Path, *, device: str = "cpu") -> StudioState:
-    """A studio with a script (.jld), a rig, or the built-in hand. Files may be read from the script's folder, and those
-    that the script as it is opened names, wherever they are.
+    """State of a studio with a script (.jld), a rig, or the built-in hand.
+
+    Files may be read from the script's folder, and elsewhere those that the script names when it is opened.
 
     Raises:
         InputError: There is no such file, or the rig cannot be read.
@@ -31,12 +32,12 @@ def opened_document(path: Path | None, folder: Path, *, device: str = "cpu") -> 
     else:
         document = ScriptDocument(path.resolve().with_suffix(".jld"), _staging(path))
     if document.autosaved.is_file() and (kept := read_text(document.autosaved)) != document.text:
-        document.edit(kept)  # what was not saved when the studio ended; undoing it brings back the file's text
+        document.edit(kept)  # the autosaved text of an earlier session; undo restores the file's text
     return StudioState(document, folder, within=[document.path.parent, *_named(document)], device=device)
 
 
 def _staging(path: Path) -> str:
-    """The line that brings a rig on stage."""
+    """Script line that adds a rig."""
     from warpjld.io import load_rig
 
     names = load_rig(path).skeleton.names
@@ -46,10 +47,10 @@ def _staging(path: Path) -> str:
 
 
 def _named(document: ScriptDocument) -> list[Path]:
-    """Files that a script reads as it stands."""
+    """Files that a script reads."""
     from warpjld.studio.performance import Performance
 
     trial = Performance(Path("out"), say=lambda line: None)
-    with suppress(WarpjldError):  # it is shown where the script is
+    with suppress(WarpjldError):  # errors of the script are shown in the studio
         trial.run(document.text, document.path)
     return [*trial.scene.read]

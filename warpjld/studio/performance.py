@@ -1,4 +1,4 @@
-"""A document run to its scene; after an edit only from the first statement that changed."""
+"""Incremental execution of a script: after an edit only statements from the first changed one on are run again."""
 
 from __future__ import annotations
 

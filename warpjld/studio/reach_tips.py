@@ -1,4 +1,4 @@
-"""Fingertips brought to places: the angles of a hand nearest to those it has, inside its limits."""
+"""Inverse kinematics of fingertips: joint angles near the present ones, within limits, that reach given positions."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from warpjld.skeleton import CHANNELS, DIGITS, poses_from_angles
 
 __all__ = ["reach_tips", "tips"]
 
-_NEAR = 2e-3  # weight of staying [1/rad] beside distances over the hand's length
+_NEAR = 2e-3  # weight of changes of the angles [1/rad], against distances relative to the hand's length
 _BEGIN = (0.05, 0.35)
-"""How far inside the limits searches begin, as a share of their range."""
-_REACHED = 1e-3  # of the hand's length
-_STEP = 1e-6  # of differences [rad]
+"""Starting points of the searches: distances inside the limits, as fractions of their range."""
+_REACHED = 1e-3  # distance that counts as reached, relative to the hand's length
+_STEP = 1e-6  # step of the finite differences [rad]
 
 
 def tips(actor: Actor, side: str) -> dict[str, int]:
@@ -28,14 +28,14 @@ def tips(actor: Actor, side: str) -> dict[str, int]:
 def reach_tips(
     actor: Actor, side: str, frame: float, targets: Mapping[str, NDArray[np.float64]], *, wrist: bool = False
 ) -> dict[str, float]:
-    """Degrees by channel with which fingertips come nearest to places on the stage.
+    """Angles [degrees] by channel with which fingertips come nearest to world positions.
 
     Args:
-        actor: Whose.
-        side: Of which hand.
-        frame: At which frame; everything that is not moved is as it is there.
-        targets: Places of the tips by digit [m], shape (3,); digits that are not among them keep their angles.
-        wrist: Whether the wrist bends, too.
+        actor: The actor.
+        side: ``left`` or ``right``.
+        frame: The frame; all other channels keep their angles at it.
+        targets: Target positions of the tips by digit [m], shape (3,); digits not named keep their angles.
+        wrist: Whether the wrist may move as well.
     """
     from scipy.optimize import least_squares
 
@@ -62,7 +62,7 @@ def reach_tips(
         both = residuals(np.concatenate([values + shifts, values - shifts]))
         return np.asarray((both[: len(values)] - both[len(values) :]).T / (2.0 * _STEP))
 
-    # from a straight finger, whose joints stand at their limits, no small step leads on: the search begins inside
+    # the joints of a straight finger are at their limits, where a local search is stuck: start inside the limits
     best, least = start, float((residuals(start[None]) ** 2).sum()) / 2.0
     for inside in _BEGIN:
         begin = np.clip(start, low + inside * (high - low), high - inside * (high - low))
@@ -76,7 +76,7 @@ def reach_tips(
 
 
 def _free(actor: Actor, side: str, digits: Sequence[str], wrist: bool) -> list[tuple[int, int]]:
-    """Joints and channels that may change: those of the digits, parents first."""
+    """Joints and channels that may change, parents first."""
     found = []
     for joint, name in enumerate(actor.skeleton.names):
         parts = name.split(".")

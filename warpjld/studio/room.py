@@ -1,4 +1,4 @@
-"""The studio's server with its panels on one state."""
+"""The studio's server: connects browser windows, panels and the worker thread to one state."""
 
 from __future__ import annotations
 

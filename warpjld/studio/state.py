@@ -1,4 +1,4 @@
-"""What a studio is about, without any of its panels: a document, the scene it describes, a frame, a selection."""
+"""Model of the studio, independent of its panels: document, scene, current frame, selection, solved contact."""
 
 from __future__ import annotations
 

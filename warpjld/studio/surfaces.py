@@ -1,4 +1,4 @@
-"""What is seen of a scene at a frame: the surfaces that a run makes, by actor and object, perhaps in colours."""
+"""Surfaces of a scene at a frame for the 3D view, by actor and object, optionally with vertex colours."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ __all__ = ["COLORINGS", "Coloring", "Shown", "Surfaces"]
 
 Coloring = Literal["skin", "pressure", "domains", "stretch"]
 COLORINGS: tuple[Coloring, ...] = ("skin", "pressure", "domains", "stretch")
-"""What skin may be coloured by."""
+"""Quantities that skin can be coloured by."""
 
 _STRETCH = ColorScale(0.6, 1.4, "length over rest", ("#2c5aa0", "#e9e4dc", "#b3261e"))
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """One surface: an actor's, an object's, or all that is coloured by pressure.
+    """One surface: of an actor, of an object, or of all bodies that are coloured by pressure.
 
     Attributes:
-        name: Upper case.
+        name: Name in upper case.
         vertices: Positions [m], float32, shape (V, 3).
         faces: Triangles, shape (T, 3).
-        color: ``#rrggbb``, None for skin.
-        colors: Of the vertices, uint8, shape (V, 3), where they differ.
-        joints: Of an actor: positions of its joints [m], shape (J, 3).
+        color: ``#rrggbb``; None: the default colour of skin.
+        colors: Vertex colours, uint8, shape (V, 3); None for a uniform colour.
+        joints: For an actor, positions of its joints [m], shape (J, 3).
         bones: Pairs of joints, shape (B, 2).
     """
 
@@ -50,7 +50,7 @@ class Shown:
 
 
 class Surfaces:
-    """Deforms the actors of scenes; what is bound stays bound from one scene to the next."""
+    """Deforms the actors of scenes; coverings are reused from one scene to the next."""
 
     def __init__(self, device: str = "cpu") -> None:
         self._device = device
@@ -59,7 +59,7 @@ class Surfaces:
     def at(
         self, scene: Scene, frame: float, coloring: Coloring = "skin", pressed: DeformedSurfaces | None = None
     ) -> list[Shown]:
-        """All that is on stage at a frame, as contact has it where it was solved."""
+        """All surfaces of a scene at a frame; those of the contact solution where there is one."""
         if not scene.actors:
             return []
         crowd = replace(self._crowd(scene, frame), pressed=pressed)
@@ -78,7 +78,7 @@ class Surfaces:
         return crowd
 
     def _rebind(self, actor: Actor) -> None:
-        """Give an actor the covering that the same rig had in the scene before."""
+        """Reuse the covering that the same rig had in the previous scene."""
         old = self._bound.get(actor.name)
         if actor.covering is None and old is not None and old.covering is not None:
             same = old.rig is actor.rig and old.skeleton is actor.skeleton
@@ -109,7 +109,7 @@ class Surfaces:
 
 
 def _domain_colors(domains: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Colours that tell the operators apart, mixed where their domains overlap, shape (V, 3)."""
+    """Vertex colours by operator, blended where domains overlap, shape (V, 3)."""
     import matplotlib
 
     hues = (np.arange(domains.shape[1]) * 7) % 20
@@ -118,7 +118,7 @@ def _domain_colors(domains: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def _stretch(rest: NDArray[np.floating], now: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Lengths of edges over those at rest, the mean of those at a vertex, shape (V,)."""
+    """Mean ratio of edge length to rest length at every vertex, shape (V,)."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     before, after = (np.linalg.norm(p[edges[:, 0]] - p[edges[:, 1]], axis=1) for p in (rest, now))
     ratio = after / np.maximum(before, 1e-12)

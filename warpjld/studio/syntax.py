@@ -1,8 +1,8 @@
-"""Forms from the syntax lines of commands: what a menu asks for before it writes a line.
+"""Parser for the syntax lines of commands, from which the studio makes forms.
 
 A syntax line has keywords in capitals, ``<values>``, ``<A/B>`` for a choice, ``"<texts>"``, ``[optional parts]``, ``…``
-after what may be repeated, and `` or `` between ways to call the command. What a form cannot know of a user's command
-(whether a value is a number or a name) it leaves to the command: the line is checked when it runs.
+after what may be repeated, and `` or `` between ways to call the command. What it does not say about a user's command
+(whether a value is a number or a name) is checked when the line runs.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _NUMBER = re.compile(
 
 @dataclass(frozen=True)
 class TextField:
-    """A value to type.
+    """A value to be typed.
 
     Attributes:
-        label: What it is.
-        quoted: Whether it stands in quotes: a file's name, a message.
-        number: Whether it seems to be a number.
-        suffixes: Of a file to make: the endings it may have.
-        repeated: Whether there may be several, with blanks between.
+        label: Its label.
+        quoted: Whether it is a quoted text: a file name, a message.
+        number: Whether it is probably a number.
+        suffixes: Allowed suffixes, if it is the name of an output file.
+        repeated: Whether several values, separated by blanks, are allowed.
     """
 
     label: str
@@ -53,7 +53,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Option:
-    """A part that may be left out: its keyword, if it has one, and what follows it."""
+    """An optional part: its keyword, if it has one, and the fields after it."""
 
     keyword: str
     fields: tuple[Field, ...]
@@ -61,7 +61,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Keyword:
-    """A word that always stands there."""
+    """A fixed word."""
 
     word: str
 
@@ -77,7 +77,7 @@ class Way:
 
     @property
     def title(self) -> str:
-        """What tells it from the other ways."""
+        """Title that distinguishes it from the other ways."""
         words = []
         for field in self.fields:
             match field:
@@ -94,7 +94,7 @@ class Way:
 
 
 def ways_of(name: str, syntax: str) -> tuple[Way, ...]:
-    """The ways to call a command, of its syntax line."""
+    """The ways to call a command, parsed from its syntax line."""
     text = re.sub(r"\bthen \[", "[", syntax.replace(", then [", " ["))
     parts = _split(text)
     ways = []
@@ -102,14 +102,14 @@ def ways_of(name: str, syntax: str) -> tuple[Way, ...]:
         body = part.strip().removeprefix(name).strip()
         fields, _ = _fields(_TOKEN.findall(body), 0)
         ways.append(Way(tuple(fields)))
-    if len(ways) > 1 and syntax != text:  # what comes after "then" belongs to every way
+    if len(ways) > 1 and syntax != text:  # the part after "then" belongs to every way
         tail = tuple(field for field in ways[-1].fields if isinstance(field, Option))
         ways = [Way((*(f for f in way.fields if f not in tail), *tail)) for way in ways]
     return tuple(ways)
 
 
 def _split(text: str) -> list[str]:
-    """Ways to call it: split where no bracket and no quote is open."""
+    """Split into the ways to call it, outside brackets and quotes."""
     parts, last = [], 0
     for match in _WAYS.finditer(text):
         before = text[: match.start()]
@@ -126,7 +126,7 @@ def _fields(tokens: list[str], k: int) -> tuple[list[Field], int]:
         k += 1
         if token == "]":
             break
-        if token.startswith("/"):  # another choice than the one before, with options of its own: it can be typed
+        if token.startswith("/"):  # an alternative with options of its own has no field; it can be typed
             while k < len(tokens) and tokens[k] != "]":
                 k = _fields(tokens, k + 1)[1] if tokens[k] == "[" else k + 1
             continue
@@ -159,7 +159,7 @@ def _field(token: str) -> Field:
 
 
 def _called(options: list[str]) -> str:
-    """What a choice is between."""
+    """Label of a choice between keywords."""
     names = {"LEFT": "side", "THUMB": "digit", "FLEXION": "angle", "KNUCKLES2": "joint", "X": "axis"}
     return names.get(options[0], "which" if len("/".join(options)) > 24 else " or ".join(options).lower())
 
@@ -185,13 +185,13 @@ def _repeated(fields: list[Field]) -> list[Field]:
 
 
 def line_of(name: str, way: Way, values: Mapping[tuple[int, ...], object]) -> str:
-    """The line that a form comes to.
+    """Script line from the values of a form.
 
     Args:
         name: The command.
-        way: How it is called.
-        values: By the place of a field among the fields, and of a field inside an optional part by both places: texts
-            and numbers as they are, of choices the option or "", of optional parts whether they are there.
+        way: The way to call it.
+        values: Values by field index; fields inside an optional part by both indices. Texts and numbers as they are,
+            for choices the keyword or "", for optional parts whether they are present.
     """
     return " ".join([name, *_words(way.fields, (), values)])
 

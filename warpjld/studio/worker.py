@@ -1,4 +1,4 @@
-"""One thread that does all that windows ask for, in order; what is overtaken while it waits is left out."""
+"""Worker thread that runs the jobs of all browser windows in order, and drops waiting jobs that are superseded."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ __all__ = ["Worker"]
 
 
 class Worker:
-    """Jobs are done one after another. A job that waits is replaced by a later one with the same key, so that a slider
-    that is dragged faster than the stage can be drawn skips places and does not lag behind.
+    """Runs jobs one after another. A waiting job is replaced by a later one with the same key, so that a slider dragged
+    faster than the view is drawn skips positions instead of lagging behind.
 
     Args:
-        idle: Called when nothing waits any more after jobs, and every ``tick`` seconds while ``ticking`` says so.
-        failed: Told of what a job raised.
+        idle: Called when the queue becomes empty after jobs.
+        failed: Called with exceptions that jobs raise.
     """
 
     def __init__(self, idle: Callable[[], None], failed: Callable[[BaseException], None]) -> None:
@@ -28,23 +28,23 @@ class Worker:
         self._thread.start()
 
     def post(self, job: Callable[[], object], key: Hashable = None) -> None:
-        """Have a job done; one with this key that waits is not done."""
+        """Queue a job; a waiting job with the same key is dropped."""
         with self._wake:
             self._jobs[object() if key is None else key] = job
             self._wake.notify_all()
 
     def waits(self, key: Hashable) -> bool:
-        """Whether a job with this key waits."""
+        """Whether a job with this key is waiting."""
         with self._wake:
             return key in self._jobs
 
     def settle(self, timeout: float = 60.0) -> bool:
-        """Wait until everything that was posted is done; False where it is not in time."""
+        """Wait until the queue is empty; False if that takes longer than ``timeout`` [s]."""
         with self._wake:
             return self._wake.wait_for(lambda: not self._jobs and not self._busy, timeout)
 
     def stop(self) -> None:
-        """Do what is being done to its end, and nothing more."""
+        """Finish the running job and stop."""
         with self._wake:
             self._running = False
             self._wake.notify_all()

@@ -1,6 +1,6 @@
-"""Many trials: planned, run over processes, resumed, and brought into one table.
+"""Studies: many independent trials, run in processes or on a cluster, resumable, collected into one table.
 
-`run_study` repeats any `Experiment`; `warpjld.study.grasping` has the one that closes hands on objects.
+`run_study` runs any `Experiment`; `warpjld.study.grasping` holds the one that closes hands on objects.
 """
 
 from warpjld.study.experiment import Experiment, Outcome

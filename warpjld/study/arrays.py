@@ -1,4 +1,4 @@
-"""Rows and arrays of a study from its trials on disk, in their order: the same bytes however it was run."""
+"""Collects rows and arrays of a study from its trials on disk; the files are the same, byte for byte, in any run."""
 
 from __future__ import annotations
 
@@ -17,10 +17,14 @@ __all__ = ["gathered", "write_arrays"]
 
 
 def gathered(shards: Iterable[Shard]) -> tuple[list[dict[str, Any]], dict[str, NDArray[Any]]]:
-    """Rows in trial order, and per array name the trials that have it stacked, with their numbers as ``NAME.trials``.
+    """Collect the trials.
+
+    Returns:
+        Rows in trial order; and for every array name the arrays of all trials that have it, stacked, with the numbers
+        of these trials as ``NAME.trials``.
 
     Raises:
-        WarpjldError: One name with two shapes.
+        WarpjldError: Arrays of one name with different shapes or types.
     """
     rows: list[dict[str, Any]] = []
     stacks: dict[str, list[NDArray[Any]]] = {}
@@ -45,6 +49,6 @@ def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
     """Write a NumPy archive (npz)."""
     assert not any(array.dtype.hasobject for array in arrays.values())
     with whole_file(path) as part, part.open("wb") as file:
-        # numpy dates the archive's members 1980, so bytes do not depend on the clock
-        # numpy 2.0 knows no allow_pickle here, and would store it as one array more
+        # numpy sets the date of the archive's members to 1980, so the bytes do not depend on the clock
+        # numpy 2.0 has no argument allow_pickle here, and would store it as another array
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What a study repeats, as the runner sees it."""
+"""Protocol of experiments: what the study runner needs of the trials that it repeats."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Outcome:
     """Result of one trial.
 
     Attributes:
-        status: One word for how it ended.
-        values: Column → value; a missing column is an empty cell.
-        arrays: Name → array, such as poses. A name has one shape throughout the study; not every trial needs it.
-        message: What is worth knowing.
+        status: How it ended, as a short word.
+        values: Values by column; a missing column becomes an empty cell.
+        arrays: Arrays by name, such as poses. Arrays of one name have the same shape in all trials that have them.
+        message: Remark for the table.
     """
 
     status: str
@@ -33,72 +33,72 @@ class Outcome:
 
 
 class Experiment(Protocol):
-    """One kind of trial. It is pickled once to each worker, so it holds the plan, not what is loaded from it.
+    """One kind of trial. It is pickled to each worker, so it should hold the plan, not data loaded from it.
 
-    A trial must depend on nothing but the experiment and its own number: not on what ran before it in the process.
+    A trial may depend only on the experiment and the trial's number, not on what ran before it in the process.
     """
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Schema of ``Outcome.values``."""
+        """Columns of ``Outcome.values``."""
 
     @property
     def success(self) -> str:
-        """Truth column that the success rate counts."""
+        """Name of the truth column that the success rate counts."""
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Columns whose values the summary tells apart."""
+        """Columns by whose values the summary groups success rates."""
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Number columns whose distributions the summary draws, six at most."""
+        """Number columns whose distributions the summary draws, at most six."""
 
     @property
     def trials(self) -> int:
-        """How many trials."""
+        """Number of trials."""
 
     @property
     def seed(self) -> int:
-        """What all random numbers come from."""
+        """Seed of all random numbers."""
 
     def plan(self, trial: int) -> dict[str, Any]:
-        """Columns known before the trial is run: they are in its row even if it fails, so that failures count in the
-        group they belong to."""
+        """Columns known before a trial is run. They are in its row even if it fails, so that failures are counted in
+        their group."""
 
     def identity(self) -> dict[str, Any]:
-        """All that determines the results but the number of trials, as JSON: settings, hashes of input files."""
+        """Everything but the number of trials that determines the results, as JSON: settings, hashes of inputs."""
 
     def begin(self) -> None:
         """Called once in every worker process, before its first trial."""
 
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
-        """Trial number ``trial``. Exceptions become rows with status "error"."""
+        """Run trial number ``trial``. Exceptions become rows with status "error"."""
 
     def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-        """What is said of all trials together, as JSON for the manifest."""
+        """Results about all trials together, as JSON for the manifest."""
 
     def inputs(self) -> tuple[Path, ...]:
-        """Files that its trials read: what another machine must be given."""
+        """Files that the trials read, which other machines must be sent."""
 
     def moved(self, places: Mapping[Path, Path]) -> Experiment:
-        """The same experiment where each of its inputs lies elsewhere."""
+        """Copy that reads its inputs from other paths."""
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
-        """Draw a trial; may draw nothing."""
+        """Draw a trial; the files written, which may be none."""
 
 
 @runtime_checkable
 class BatchedExperiment(Experiment, Protocol):
-    """An experiment whose trials cost less where several that are alike are begun together, with the same results."""
+    """An experiment that can compute similar trials in a batch, with the same results as one by one."""
 
     def alike(self, trial: int) -> Hashable:
-        """The same for all trials that are."""
+        """Key of a trial; trials with equal keys can be batched."""
 
     def look_ahead(self, trials: Sequence[int]) -> None:
-        """Called in a worker before it runs these trials, which are alike: what they have in common is computed."""
+        """Called in a worker before it runs these trials, which have equal keys, to compute them in a batch."""
 
 
 def generator(seed: int, trial: int) -> np.random.Generator:
-    """The trial's own random numbers: of its number, not of the process or the order it runs in."""
+    """Random generator of a trial; it depends on its number only, not on processes or order."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(trial,)))

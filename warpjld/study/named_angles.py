@@ -1,4 +1,4 @@
-"""Joint angles by name, as files of grasps have them: ``index.base.flexion``."""
+"""Joint angles by name, such as ``index.base.flexion``, for files of grasps."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from warpjld.suggest import did_you_mean
 
 __all__ = ["angles_by_name", "beyond_limits", "channel_names", "channel_of", "free_channels"]
 
-_MOST = 2.0 * np.pi  # no joint turns further [rad]
+_MOST = 2.0 * np.pi  # largest magnitude of an angle; larger ones are probably in degrees [rad]
 
 
 def channel_names(skeleton: Skeleton, chosen: NDArray[np.bool_]) -> list[str]:
-    """Names of the channels chosen, shape (J, 4), joint by joint: ``left.index.base.flexion``."""
+    """Names of the channels in a mask (J, 4), joint by joint, such as ``left.index.base.flexion``."""
     return [f"{skeleton.names[j]}.{CHANNELS[k]}" for j, k in np.argwhere(chosen).tolist()]
 
 
 def free_channels(skeleton: Skeleton, angles: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Channels that say all of postures: those with room between their limits, and those that differ from rest.
+    """Channels needed to describe postures: those that can move, and those that differ from rest in any posture.
 
     Args:
-        skeleton: Whose.
+        skeleton: The skeleton.
         angles: Joint angles [rad], shape (G, J, 4).
 
     Returns:
-        Which of the channels, shape (J, 4).
+        Mask of the channels, shape (J, 4).
     """
     room = skeleton.limits[..., 1] > skeleton.limits[..., 0]
     return np.asarray(room | (angles != skeleton.initial).any(axis=0))
 
 
 def channel_of(skeleton: Skeleton, name: str) -> tuple[int, int] | None:
-    """Joint and channel of a name, whose side may be left out; None where it is none of this skeleton's."""
+    """Indices of joint and channel by name, side optional; None if this skeleton has no such joint or channel."""
     joint, _, channel = name.rpartition(".")
     if channel not in CHANNELS:
         return None
@@ -47,10 +47,10 @@ def channel_of(skeleton: Skeleton, name: str) -> tuple[int, int] | None:
 
 
 def angles_by_name(skeleton: Skeleton, values: Mapping[str, float]) -> NDArray[np.float64]:
-    """Joint angles [rad], shape (J, 4), of named ones; what is not named is as at rest.
+    """Joint angles [rad], shape (J, 4), from angles by name; channels not named keep their rest angles.
 
     Raises:
-        InputError: A name that is no channel of this hand, a joint twice, or no angle in radians.
+        InputError: A name that is no channel of this hand, an angle given twice, or a number that is no angle.
     """
     _check_names(skeleton, values)
     angles, seen = skeleton.initial.copy(), dict[tuple[int, int], str]()
@@ -66,7 +66,7 @@ def angles_by_name(skeleton: Skeleton, values: Mapping[str, float]) -> NDArray[n
 
 
 def beyond_limits(skeleton: Skeleton, angles: NDArray[np.float64]) -> int:
-    """How many of these angles [rad], shape (J, 4), are more than a degree beyond their limits."""
+    """Number of angles (J, 4) [rad] that are more than one degree beyond their limits."""
     slack = np.radians(1.0)
     low, high = skeleton.limits[..., 0] - slack, skeleton.limits[..., 1] + slack
     return int(((angles < low) | (angles > high)).sum())
@@ -80,5 +80,5 @@ def _check_names(skeleton: Skeleton, names: Iterable[str]) -> None:
     few = ", ".join(f"'{name}'" for name in strange[:3]) + (", …" if len(strange) > 3 else "")
     raise InputError(
         f"{few}: no joint of this hand{did_you_mean(strange[0], known)}; its angles are called index.base.flexion and "
-        "so on. A robot's joints mean nothing here unless a joint map says which angle of the hand each of them is"
+        "so on. Joints with other names, such as a robot's, need a joint map that says which angle each of them is"
     )

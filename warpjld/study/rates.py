@@ -1,4 +1,4 @@
-"""Success rates of a study, overall and by group, failures in the denominator."""
+"""Success rates of a study, overall and by group; trials that failed or crashed count as no success."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ __all__ = ["Rate", "success_rates"]
 
 @dataclass(frozen=True)
 class Rate:
-    """Success rate of some trials.
+    """Success rate of a group of trials.
 
     Attributes:
-        group: Column told apart, "" for all trials.
-        value: Its value in these trials.
-        successes: How many succeeded.
-        trials: How many there were, errors and crashes included.
+        group: Column that defines the group, "" for all trials.
+        value: The column's value in this group.
+        successes: Number of successes.
+        trials: Number of trials, errors and crashes included.
         low: Lower bound of the 95 % Wilson interval of the rate; likewise ``high``.
-        statuses: Status → number of trials, most frequent first.
+        statuses: Number of trials by status, most frequent first.
     """
 
     group: str
@@ -35,17 +35,17 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Share of successes; 0 where there were no trials."""
+        """Fraction of successes; 0 without trials."""
         return self.successes / self.trials if self.trials else 0.0
 
 
 def success_rates(rows: Sequence[dict[str, Any]], success: str, groups: Sequence[str]) -> list[Rate]:
-    """Rate of all trials, then of every value of every group column.
+    """Success rate of all trials, then of every value of every group column.
 
     Args:
         rows: The table.
-        success: Truth column that counts; an empty cell is a failure.
-        groups: Columns whose values are told apart.
+        success: Name of the truth column; an empty cell is a failure.
+        groups: Columns to group by.
     """
     rates = [_rate("", "all", rows, success)]
     for group in groups:
@@ -55,8 +55,8 @@ def success_rates(rows: Sequence[dict[str, Any]], success: str, groups: Sequence
         if all(isinstance(value, int | float) for value in values):
             values.sort(key=float)
         for value in values:
-            some = [row for row in rows if row.get(group) == value]
-            rates.append(_rate(group, "(none)" if value is None else str(value), some, success))
+            members = [row for row in rows if row.get(group) == value]
+            rates.append(_rate(group, "(none)" if value is None else str(value), members, success))
     return rates
 
 

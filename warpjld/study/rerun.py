@@ -1,4 +1,4 @@
-"""One trial of a finished study again: the same numbers, and pictures of it."""
+"""Rerun of one trial of a finished study: compare with the stored result, and draw it."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ __all__ = ["Rerun", "rerun_trial"]
 
 @dataclass(frozen=True, eq=False)
 class Rerun:
-    """A trial run again.
+    """Result of ``rerun_trial``.
 
     Attributes:
-        row: Its row.
-        differences: Columns and arrays that differ from the study's, bit for bit; empty where all is the same.
-        files: The row as JSON, and the pictures.
+        row: The trial's row.
+        differences: Columns and arrays that differ from the stored ones in any bit; empty if none do.
+        files: The files written: the row as JSON, and pictures.
     """
 
     row: dict[str, Any]
@@ -42,15 +42,15 @@ def rerun_trial(
     *,
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> Rerun:
-    """Run one trial of a study in ``out`` again, compare it with what is there, and draw it.
+    """Run one trial of a study in ``out`` again, compare it with the stored result, and draw it.
 
     Raises:
         InputError: ``out`` holds another study, or not this trial.
-        WarpjldError: The trial ends its process again.
+        WarpjldError: The trial crashed its process.
     """
     folder = Path(out)
     if not (folder / "study.json").exists():
-        raise InputError("holds no study", path=folder)
+        raise InputError("there is no study in this folder", path=folder)
     kept = opened(experiment, folder).read(trial)
     if kept is None:
         raise InputError(f"row {trial} is not in the study in {folder}; it has rows 0 to {experiment.trials - 1}")
@@ -71,7 +71,8 @@ def rerun_trial(
 
 
 def _in_a_worker(experiment: Experiment, trial: int, folder: Path) -> tuple[dict[str, Any], Outcome]:
-    # not in this process: its libraries may sum on several threads, in another order
+    """Run a trial in a single-threaded worker, as in the study."""
+    # not in this process, whose libraries may add numbers on several threads in another order
     try:
         with one_thread(), worker_pool(TrialWork(experiment, folder), 1) as workers:
             outcome: tuple[dict[str, Any], Outcome] = workers.result(workers.submit(perform, experiment, trial))

@@ -1,4 +1,4 @@
-"""Running a study from start, or from where it was stopped, to its table."""
+"""Running or resuming a study, and writing its table, arrays, manifest and summary."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ _TRIALS, _IDENTITY = "trials", "study.json"
 
 @dataclass(frozen=True, eq=False)
 class StudyResult:
-    """What a finished study left.
+    """Result of ``run_study``.
 
     Attributes:
-        files: Everything written but the single trials.
-        rates: Success rates, the first of all trials.
-        ran: Trials run now; the others were there already.
-        seconds: Wall-clock time.
-        notes: What was found in the folder, and done about it.
+        files: Files written, without those of single trials.
+        rates: Success rates; the first is that of all trials.
+        ran: Number of trials run now; the others were on disk already.
+        seconds: Wall-clock time [s].
+        notes: Messages about the folder, such as damaged trials that were run again.
     """
 
     files: tuple[Path, ...]
@@ -76,25 +76,25 @@ def run_study(
     allow_mixed: bool = False,
     report: Report = lambda what, done, total: None,
 ) -> StudyResult:
-    """Run what is missing of a study, then write its table, arrays, manifest and summary.
+    """Run the missing trials of a study, then write its table, arrays, manifest and summary.
 
-    ``table.parquet``, ``table.csv`` and ``poses.npz`` depend on nothing but the experiment: not on the number of
+    The table and ``poses.npz`` depend only on the experiment, byte for byte: not on the number of
     processes, nor on how often the study was stopped. Wall-clock times are in ``manifest.json``.
 
     Args:
-        experiment: What to repeat.
-        out: Folder; one that holds the same study is resumed.
-        processes: Worker processes; as many as the machine has cores by default.
-        table: "parquet" (wants the extra ``study``), "csv", or "both".
-        fresh: Forget what ``out`` holds.
-        title: For the summary.
+        experiment: The experiment.
+        out: Output folder; a study of the same experiment in it is resumed.
+        processes: Number of worker processes; by default the number of cores.
+        table: "parquet" (needs the extra ``study``), "csv", or "both".
+        fresh: Delete the trials in ``out`` first.
+        title: Title of the summary.
         ray: Address of a Ray cluster that runs the trials, or ``local``; None for processes of this machine.
-        allow_mixed: Take machines of the cluster whose bits differ.
-        report: Called with what is being done, how much is done, and of how much.
+        allow_mixed: Also use machines of the cluster whose results differ in bits.
+        report: Called with a stage's name, steps done and steps in total.
 
     Raises:
         InputError: ``out`` holds another study, or cannot be written.
-        MissingExtraError: Parquet is wanted and pyarrow is not installed, or a cluster and Ray is not.
+        MissingExtraError: The table is to be Parquet without pyarrow, or a cluster is given without Ray.
     """
     if table not in ("parquet", "csv", "both"):
         raise InputError(f"table: want 'parquet', 'csv' or 'both', got {table!r}")
@@ -111,7 +111,7 @@ def run_study(
     damaged = [trial for trial in missing if shards.path(trial).exists()]
     if damaged:
         few = ", ".join(map(str, damaged[:5])) + (", …" if len(damaged) > 5 else "")
-        notes.append(f"{len(damaged)} trials kept in {folder} are damaged and run again: {few}")
+        notes.append(f"{len(damaged)} trials in {folder} are damaged and run again: {few}")
     finished = experiment.trials - len(missing)
     report("trials", finished, experiment.trials)
 
@@ -151,7 +151,7 @@ def _run_missing(
     done: Callable[[int, str], None],
     note: Callable[[str], None],
 ) -> dict[str, Any]:
-    """Run trials here or on a cluster; returns where, for the manifest."""
+    """Run trials in processes or on a cluster; a description of these, for the manifest."""
     if ray is None:
         workers = min(processes or cores(), max(len(missing), 1))
         run_trials(experiment, missing, kept, processes=workers, done=done)
@@ -165,7 +165,7 @@ def _run_missing(
 
 
 def _described(experiment: Experiment, rows: list[dict[str, Any]], rates: list[Rate]) -> dict[str, Any]:
-    """What was tried, and how it ended."""
+    """The manifest's description of the experiment and of how its trials ended."""
     return {
         "trials": experiment.trials,
         "seed": experiment.seed,
@@ -179,12 +179,12 @@ def _described(experiment: Experiment, rows: list[dict[str, Any]], rates: list[R
 
 
 def opened(experiment: Experiment, folder: Path, *, fresh: bool = False, notes: list[str] | None = None) -> Shards:
-    """The folder's trials, after making sure that they belong to this experiment.
+    """Open a study's folder; its trials, after a check that they belong to this experiment.
 
-    Where the file that says what they are is damaged, they are set aside, which is noted, and all are run again.
+    If the file with their identity is damaged, the trials are renamed and kept, a note is added, and all are run again.
 
     Raises:
-        InputError: They do not, or the folder cannot be used.
+        InputError: They belong to another experiment, or the folder cannot be used.
     """
     identity = experiment.identity()
     known = folder / _IDENTITY
@@ -197,7 +197,7 @@ def opened(experiment: Experiment, folder: Path, *, fresh: bool = False, notes: 
             if before is None:
                 aside = _set_aside(folder)
                 if notes is not None:
-                    notes.append(f"{known} is damaged: what was there is in {aside}, and all trials are run again")
+                    notes.append(f"{known} is damaged: the old trials are in {aside}, and all trials are run again")
             else:
                 _same_study(before, identity, folder)
         elif (folder / _TRIALS).exists():
@@ -210,7 +210,7 @@ def opened(experiment: Experiment, folder: Path, *, fresh: bool = False, notes: 
 
 
 def _known(path: Path) -> dict[str, Any] | None:
-    """What a study's file says it is; None where it is damaged."""
+    """Identity of the study in a folder; None if the file is damaged."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError):

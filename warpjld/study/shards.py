@@ -1,4 +1,4 @@
-"""Results on disk while a study runs: one file a trial, whole or absent."""
+"""Storage of trials while a study runs: one JSON file per trial, written atomically."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from warpjld.tables.columns import Column, checked_values
 __all__ = ["Shard", "Shards"]
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, MemoryError, RecursionError)
-_A_FOLDER = 1000  # file systems and people dislike folders with a hundred thousand files
+_A_FOLDER = 1000  # trials per folder, to avoid folders with very many files
 
 
 @dataclass(frozen=True, eq=False)
 class Shard:
-    """One trial as kept on disk: a row of the table, its arrays, and the wall-clock seconds, which no table has."""
+    """One trial as stored: row of the table, arrays, and wall-clock time [s], which is not in the table."""
 
     trial: int
     row: dict[str, Any]
@@ -32,7 +32,7 @@ class Shard:
     seconds: float
 
     def packed(self) -> bytes:
-        """As it is kept on disk."""
+        """Bytes of its file."""
         content = {
             "trial": self.trial,
             "row": self.row,
@@ -43,23 +43,22 @@ class Shard:
 
     @staticmethod
     def unpacked(content: bytes) -> Shard:
-        """What `packed` made; raises whatever damaged bytes lead to."""
+        """Inverse of `packed`; damaged bytes raise one of the exceptions in ``_DAMAGED``."""
         found = json.loads(content.decode("utf-8"))
         arrays = {name: _unpacked(packed) for name, packed in found["arrays"].items()}
         return Shard(int(found["trial"]), dict(found["row"]), arrays, float(found["seconds"]))
 
     def results(self) -> bytes:
-        """Its results alone, which are the same bits wherever it is run: all but the seconds."""
+        """Bytes of its results without the time; these are the same wherever the trial is run."""
         return replace(self, seconds=0.0).packed()
 
 
 class Shards:
-    """The folder of trials. Numbers are kept exactly: JSON holds doubles by their shortest decimal form, arrays by
-    their bytes.
+    """Folder of trials. Numbers are stored exactly: doubles as shortest round-trip decimals, arrays as bytes.
 
     Args:
         folder: The folder.
-        columns: What the row of a trial must hold to count; empty where any will do.
+        columns: Columns that a trial's row must have to be valid; empty: no check.
     """
 
     def __init__(self, folder: Path, columns: Sequence[Column] = ()) -> None:
@@ -71,20 +70,20 @@ class Shards:
         return self._folder / f"{trial // _A_FOLDER:04d}" / f"{trial:07d}.json"
 
     def write(self, shard: Shard) -> None:
-        """Keep a trial; whoever reads sees all of it or nothing, whenever the writer is killed."""
+        """Write a trial atomically."""
         self.put(shard.trial, shard.packed())
 
     def put(self, trial: int, content: bytes) -> None:
-        """Keep a trial that another machine has packed."""
+        """Write the packed bytes of a trial atomically."""
         target = self.path(trial)
         target.parent.mkdir(parents=True, exist_ok=True)
-        # two writers of one trial (a worker thought dead) must not share a file
+        # two writers of the same trial (one of them presumed dead) must not use the same temporary file
         beside = target.with_name(f"{target.name}.{os.getpid()}.part")
         beside.write_bytes(content)
         beside.replace(target)
 
     def read(self, trial: int) -> Shard | None:
-        """A trial, or None where it has not been run, or its file is damaged."""
+        """A trial; None if it has not been run or its file is damaged."""
         try:
             shard = Shard.unpacked(self.path(trial).read_bytes())
             if {shard.trial, shard.row.get("trial", trial)} != {trial} or not isinstance(shard.row["status"], str):
@@ -98,14 +97,14 @@ class Shards:
             return None
 
     def missing(self, count: int) -> list[int]:
-        """Trials of 0…count − 1 that have no whole file."""
+        """Numbers of the trials in 0…count − 1 without a valid file."""
         return [trial for trial in range(count) if self.read(trial) is None]
 
     def all(self, count: int) -> Iterator[Shard]:
         """Trials 0…count − 1 in order.
 
         Raises:
-            LookupError: One is not there.
+            LookupError: One is missing.
         """
         for trial in range(count):
             shard = self.read(trial)
@@ -114,7 +113,7 @@ class Shards:
             yield shard
 
     def sweep(self) -> None:
-        """Remove what killed writers left."""
+        """Remove temporary files of killed writers."""
         for part in self._folder.glob("*/*.part"):
             part.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""One page about a study: success rates with their intervals, how trials ended, and the numbers that were measured."""
+"""Summary page of a study: success rates with confidence intervals, statuses, and distributions of the metrics."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def write_summary(
     """Write ``summary.png`` and ``summary.html``, which holds the picture too.
 
     Args:
-        folder: Where to.
-        title: Name of the study.
-        rates: See `success_rates`.
+        folder: Output folder.
+        title: Title of the study.
+        rates: Success rates, see `success_rates`.
         rows: The table.
-        shown: Number columns to draw as distributions.
+        shown: Number columns whose distributions are drawn.
 
     Returns:
         The files written.
@@ -70,7 +70,7 @@ def _draw(
         for axis in axes[len(measured) :]:
             axis.set_axis_off()
     for label in figure.findobj(Text):
-        label.set_parse_math(False)  # a title may cost $5
+        label.set_parse_math(False)  # a title may contain $
     with whole_file(path) as part:
         figure.savefig(part, metadata={"Software": None})
 
@@ -112,7 +112,7 @@ def _histogram(axis: Any, rows: Sequence[dict[str, Any]], column: Column) -> Non
 
 
 def _readable(values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
-    """Small lengths, areas and volumes in millimetres."""
+    """Values and unit; lengths, areas and volumes below (0.5 m)ⁿ are converted to millimetres."""
     power = {"m": 1, "m²": 2, "m³": 3}.get(unit)
     if power and np.abs(values).max() < 0.5**power:
         return values * 1000.0**power, f"m{unit}"
@@ -145,7 +145,7 @@ def _page(title: str, rates: Sequence[Rate], picture: str) -> str:
     name = html.escape(title)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{name}</title><style>{_STYLE}</style>'
-        f"<h1>{name}</h1><p>Every trial counts: errors and crashes are failures. Intervals are 95 % Wilson score "
+        f"<h1>{name}</h1><p>All trials are counted; errors and crashes are failures. Intervals are 95 % Wilson score "
         f"intervals.</p><table><tr><th>group</th><th>value</th><th>successes</th><th>trials</th><th>rate</th>"
         f"<th>interval</th><th>how they ended</th></tr>{''.join(lines)}</table>"
         f'<img alt="Success rates and distributions" src="data:image/png;base64,{picture}"></html>\n'

@@ -1,7 +1,7 @@
-"""How good a grasp is. One measure a file, each with its formula and its source.
+"""Grasp quality metrics, one per file, each with its formula and its source.
 
 All but `penetration`, `self_penetration` and `contact_map` take plain arrays or a `Contacts` set, so that grasps from
-elsewhere can be judged too.
+other programs can be judged too. docs/explanation/metrics.md lists them and says how to add one.
 """
 
 from warpjld.grasp.quality.closure import Closure, force_closure

@@ -1,4 +1,4 @@
-"""Force closure: whether the contacts can balance any wrench whatever, given enough force."""
+"""Force closure: whether the contacts can balance every wrench, given enough force."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from warpjld.grasp.quality.wrenches import contact_wrenches, has_full_rank
 
 __all__ = ["Closure", "force_closure"]
 
-# HiGHS solves to 1e-7; a margin below this could be its rounding
+# tolerance of the HiGHS solver; a smaller margin could be a rounding error
 _MARGIN = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """Answer of `force_closure`.
+    """Result of `force_closure`.
 
     Attributes:
         closed: Whether the grasp is force closed.
-        margin: Smallest share any cone edge has in the squeeze below, times the number of edges: 0…1, and 1 where all
-            edges push alike. 0 without closure.
-        full_rank: Whether the wrenches span all six dimensions: without, no friction will close the grasp.
+        margin: Smallest coefficient of any cone edge in the internal force, times the number of edges, from 0 (not
+            closed) to 1 (all edges contribute equally).
+        full_rank: Whether the wrenches span all six dimensions; if not, the contacts cannot be force closed.
         squeeze: Normal force of each contact in the internal grasp force found, summing to 1 [N], shape (C,); zeros
             without closure.
-        forces: The same in the contacts' frames, rows (f_t₁, f_t₂, f_n, τ_n), shape (C, 4).
+        forces: That internal force in the contacts' frames, rows (f_t₁, f_t₂, f_n, τ_n), shape (C, 4).
     """
 
     closed: bool
@@ -41,7 +41,7 @@ class Closure:
 def force_closure(
     contacts: Contacts, center: ArrayLike = (0.0, 0.0, 0.0), *, torque_scale: float = 1.0, edges: int = 8
 ) -> Closure:
-    """Whether friction cones, discretised from inside, positively span the space of wrenches.
+    """Test whether friction cones, discretised from inside, positively span the space of wrenches.
 
     Force closure ⇔ the primitive wrenches w_k have rank 6 and the origin lies strictly inside their convex hull
     (Nguyen 1988, "Constructing force-closure grasps"; Murray, Li & Sastry 1994, Proposition 5.3). Strictly inside means
@@ -49,7 +49,7 @@ def force_closure(
 
         maximise t   subject to   Σ α_k w_k = 0,   Σ α_k = 1,   α_k ≥ t
 
-    (HiGHS). Neither ``center`` nor ``torque_scale`` changes the answer; they only condition the program.
+    (HiGHS). Neither ``center`` nor ``torque_scale`` changes the result; they only improve the conditioning.
 
     Args:
         contacts: C contacts.
@@ -72,6 +72,7 @@ def force_closure(
 
 
 def _even_combination(wrenches: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Solve the linear program of ``force_closure`` for wrenches (6, k): coefficients α (k,) and their minimum t."""
     from scipy.optimize import linprog
 
     count = wrenches.shape[1]
@@ -91,6 +92,7 @@ def _even_combination(wrenches: NDArray[np.float64]) -> tuple[NDArray[np.float64
 
 
 def _contact_forces(contacts: Contacts, shares: NDArray[np.float64], edges: int) -> NDArray[np.float64]:
+    """Contact forces (C, 4) from coefficients of all cone edges."""
     from warpjld.grasp.quality.cone import friction_cone
 
     forces, start = np.zeros((len(contacts), 4)), 0

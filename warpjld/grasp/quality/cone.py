@@ -1,4 +1,4 @@
-"""Friction cones as polyhedral cones: the forces and torques one contact can pass on."""
+"""Linearised friction cones: the forces and torques that a contact can transmit."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def friction_cone(contacts: Contacts, edges: int = 8) -> list[NDArray[np.float64
 
         f_k = n + μ (cos θ_k t₁ + sin θ_k t₂),   θ_k = 2πk/edges,
 
-    so a discretised grasp is never judged better than it is; the error falls with edges⁻². A soft finger also passes a
-    torque about its normal, within the ellipsoid (f_t/μ)² + (τ_n/γ)² ≤ f_n² (Howe & Cutkosky 1996), from which the two
-    poles τ_n = ±γ are added to the ring above.
+    so the discretisation never overestimates a grasp; its error falls with edges⁻². A soft finger also transmits a
+    torque about its normal, within the ellipsoid (f_t/μ)² + (τ_n/γ)² ≤ f_n² (Howe & Cutkosky 1996), whose two poles
+    τ_n = ±γ are added to the edges above.
 
     Args:
         contacts: C contacts.

@@ -1,4 +1,4 @@
-"""Contact by vertex, of the skin and of the object, with the part of the hand that touches."""
+"""Contact map: signed distance and contact of every vertex of the skin and of the object, with the part in contact."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
-from warpjld.grasp.kept import kept_with
 from warpjld.grasp.objects import Places
 from warpjld.grasp.posed_skins import PosedSkins
 
 __all__ = ["ContactMap", "contact_map"]
 
-_FAR = 0.01  # distances beyond this are not told [m]
+_FAR = 0.01  # distances beyond this are reported as infinite [m]
 
 
 @dataclass(frozen=True, eq=False)
 class ContactMap:
-    """Answer of `contact_map`. V vertices of the skin, n of the object.
+    """Result of `contact_map` for V vertices of the skin and n of the object.
 
     Attributes:
-        skin_distance: Signed distance to the object [m], negative inside, infinite beyond 1 cm, shape (V,).
-        skin_contact: Whether it is in contact, shape (V,).
-        skin_part: Part of the hand it belongs to, shape (V,); -1 for none.
-        object_distance: Signed distance to the skin [m], likewise, shape (n,).
-        object_contact: Whether it is in contact, shape (n,).
-        object_part: Part of the hand whose skin is nearest to it, where it is in contact, else -1, shape (n,).
+        skin_distance: Signed distance of skin vertices to the object [m], negative inside, infinite beyond 1 cm, (V,).
+        skin_contact: Whether each skin vertex is in contact, shape (V,).
+        skin_part: Part of the hand that each skin vertex belongs to, -1 for none, shape (V,).
+        object_distance: Signed distance of the object's vertices to the skin [m], likewise, shape (n,).
+        object_contact: Whether each of the object's vertices is in contact, shape (n,).
+        object_part: Part of the hand nearest to each of the object's vertices in contact, else -1, shape (n,).
     """
 
     skin_distance: NDArray[np.float64]
@@ -42,18 +42,18 @@ class ContactMap:
 def contact_map(
     both: HandObjectGaps, vertices: NDArray[np.floating], parts: NDArray[np.int64], *, tolerance: float
 ) -> ContactMap:
-    """Signed distances by vertex, both ways, and what is in contact: d ≤ tolerance.
+    """Signed distances d by vertex in both directions, and the vertices in contact: d ≤ tolerance.
 
-    An object's vertex belongs to the part that most of the nearest skin triangle's corners do.
+    A vertex of the object gets the part of the majority of the corners of the nearest skin triangle.
 
     Args:
-        both: Hand and object, which is at its own place.
+        both: Distances between hand and object, which is at its own placement.
         vertices: The deformed skin [m], shape (V, 3).
         parts: Part of the hand of every vertex, shape (V,); -1 for none.
         tolerance: Largest distance that counts as contact [m], 1 cm at most.
 
     Raises:
-        InputError: Shapes that do not fit, or such a tolerance.
+        InputError: Shapes that do not fit, or a tolerance outside that range.
     """
     if len(parts) != len(vertices):
         raise InputError(f"parts: want {len(vertices)}, one a vertex, got {len(parts)}")
@@ -67,7 +67,7 @@ def contact_map(
     faces = both.covering.surface.faces
     touched = (to_skin <= tolerance) & (face >= 0) & (face < len(faces))
     corners = parts[faces[np.where(touched, face, 0)]]
-    # of three corners two that agree, else the first
+    # majority of three corners, else the first
     part = np.where(corners[:, 1] == corners[:, 2], corners[:, 1], corners[:, 0])
     return ContactMap(
         to_thing, to_thing <= tolerance, parts.copy(), to_skin, to_skin <= tolerance, np.where(touched, part, -1)

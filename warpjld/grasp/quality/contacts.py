@@ -1,4 +1,4 @@
-"""A contact set: where a hand touches an object, in which direction it can push, and how rough it is there."""
+"""Contact set: contact points, normals, Coulomb and torsional friction of a hand on an object."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class Contacts:
 
     Attributes:
         points: Contact points [m], shape (C, 3).
-        normals: Unit normals of the object's surface pointing into the object: what a finger pushes along,
-            shape (C, 3). They are normalised here.
+        normals: Normals of the object's surface pointing into the object, the direction a finger pushes, shape (C, 3).
+            They are normalised here.
         friction: Coulomb coefficient μ, shape (C,) or one number; 0 is a frictionless contact.
         spin: Torsional friction: the largest torque about the normal per newton of normal force [m], shape (C,) or
-            one number; 0 is a hard point contact, more a soft finger (see `patch_spin`).
-        tangents: First tangent direction of each contact, shape (C, 3), projected and normalised here. Friction cones
-            start there; any direction will do, and one is chosen if left out.
+            one number; 0 is a hard point contact, above 0 a soft finger (see `patch_spin`).
+        tangents: First tangent direction of each contact, shape (C, 3), projected and normalised here. It is the first
+            edge of the friction cone; chosen arbitrarily if left out.
         digits: Digit (or other label) of each contact.
         areas: Area of skin in contact [m²], shape (C,); 0 where unknown.
 
@@ -45,7 +45,7 @@ class Contacts:
     def __post_init__(self) -> None:
         points = _rows("points", self.points)
         normals = _unit("normals", _rows("normals", self.normals, len(points)))
-        put = object.__setattr__  # the dataclass is frozen for everybody else
+        put = object.__setattr__  # fields of a frozen dataclass cannot be assigned otherwise
         put(self, "points", points)
         put(self, "normals", normals)
         for name in ("friction", "spin", "areas"):
@@ -66,7 +66,7 @@ class Contacts:
         return np.stack([self.tangents, np.cross(self.normals, self.tangents), self.normals], axis=2)
 
     def moved(self, rotation: ArrayLike | None = None, translation: ArrayLike = (0.0, 0.0, 0.0)) -> Contacts:
-        """The same contacts after a rigid motion x ↦ R x + t, R of shape (3, 3)."""
+        """Contacts after a rigid motion x ↦ R x + t, R of shape (3, 3)."""
         turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64)
         assert self.tangents is not None
         return Contacts(
@@ -81,7 +81,7 @@ class Contacts:
 
 
 def patch_spin(friction: ArrayLike, areas: ArrayLike) -> Array:
-    """Torsional friction [m] of a round patch under even pressure: γ = ⅔ μ a, a = √(area/π).
+    """Torsional friction [m] of a round patch under uniform pressure: γ = ⅔ μ a, a = √(area/π).
 
     The torque of a slipping disc, ∫ μ p r dA = ⅔ μ a N (Howe & Cutkosky 1996, "Practical force-motion models for
     sliding manipulation", Int. J. Robotics Research 15).
@@ -95,6 +95,7 @@ def patch_spin(friction: ArrayLike, areas: ArrayLike) -> Array:
 
 
 def _rows(name: str, values: ArrayLike, count: int | None = None) -> Array:
+    """Checked copy of finite rows (count, 3)."""
     array = np.array(values, dtype=np.float64)
     if array.size == 0:
         array = array.reshape(0, 3)
@@ -107,6 +108,7 @@ def _rows(name: str, values: ArrayLike, count: int | None = None) -> Array:
 
 
 def _unit(name: str, array: Array) -> Array:
+    """Normalised rows; InputError for one of length zero."""
     length = np.linalg.norm(array, axis=1, keepdims=True)
     bad = np.flatnonzero(length < 1e-12)
     if bad.size:
@@ -115,6 +117,7 @@ def _unit(name: str, array: Array) -> Array:
 
 
 def _numbers(name: str, values: ArrayLike, count: int) -> Array:
+    """Checked numbers ≥ 0, one for each contact, shape (count,)."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim > 1 or (array.ndim == 1 and len(array) not in (1, count)):
         raise InputError(f"{name}: want one number, or {count}, one a contact; got shape {array.shape}")
@@ -126,8 +129,9 @@ def _numbers(name: str, values: ArrayLike, count: int) -> Array:
 
 
 def _tangents(normals: Array, wanted: Array | None) -> Array:
+    """Unit tangents nearest to the wanted directions, or arbitrary ones, shape (C, 3)."""
     if wanted is None:
-        # the coordinate axis that is farthest from the normal: never parallel to it
+        # the coordinate axis farthest from the normal, which cannot be parallel to it
         wanted = np.eye(3)[np.abs(normals).argmin(axis=1)]
     wanted = _rows("tangents", wanted, len(normals))
     flat = wanted - normals * np.einsum("ci,ci->c", wanted, normals)[:, None]

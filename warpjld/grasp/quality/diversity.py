@@ -1,4 +1,4 @@
-"""How different many grasps are from one another."""
+"""Diversity of a set of grasps: entropy of joint angles, first principal component, spread of approach directions."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from warpjld.errors import InputError
 
 __all__ = ["Diversity", "diversity"]
 
-_BINS = 100
+_BINS = 100  # bins of the histograms of joint angles
 
 
 @dataclass(frozen=True)
 class Diversity:
-    """Answer of `diversity`.
+    """Result of `diversity`.
 
     Attributes:
-        grasps: How many.
+        grasps: Number of grasps.
         entropy: Mean entropy of the joint angles [nat], from 0 to ln bins: larger is more diverse.
         entropy_spread: Standard deviation of the angles' entropies [nat].
         first_component: Share of the postures' variance along their first principal component, from 1 / angles to 1:
             smaller is more diverse; 1 where all are the same.
-        approach_spread: 1 − length of the mean of unit vectors from object to wrist, from 0 (all from one side) to 1.
-        bins: Of the histograms.
+        approach_spread: 1 − length of the mean of the unit approach vectors, from 0 (all alike) to 1.
+        bins: Number of bins of the histograms.
     """
 
     grasps: int
@@ -39,7 +39,7 @@ class Diversity:
 def diversity(angles: ArrayLike, limits: ArrayLike, approaches: ArrayLike, *, bins: int = _BINS) -> Diversity:
     """Diversity of G grasps of one hand.
 
-    With p_b the share of grasps whose angle lies in bin b of ``bins`` even ones between the joint's limits,
+    With p_b the share of grasps whose angle lies in bin b of ``bins`` equal ones between the joint's limits,
 
         H = −Σ_b p_b ln p_b
 
@@ -50,12 +50,12 @@ def diversity(angles: ArrayLike, limits: ArrayLike, approaches: ArrayLike, *, bi
 
     Args:
         angles: Joint angles [rad], shape (G, A).
-        limits: Their smallest and largest values [rad], shape (A, 2); what lies beyond counts in the last bin.
-        approaches: Directions, of any length but 0, shape (G, 3).
-        bins: Of the histograms.
+        limits: Their smallest and largest values [rad], shape (A, 2); values beyond count in the first or last bin.
+        approaches: Directions of any length but 0, shape (G, 3).
+        bins: Number of bins of the histograms.
 
     Raises:
-        InputError: No grasp, shapes that do not fit, or limits without room.
+        InputError: No grasp, shapes that do not fit, or an upper limit that is not above the lower one.
     """
     postures, room = np.asarray(angles, dtype=np.float64), np.asarray(limits, dtype=np.float64)
     ways = np.asarray(approaches, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""How far a held object gives under gravity, from six directions: quasi-static balance on compliant contacts."""
+"""Displacement of a held object under gravity in six directions: quasi-static balance on compliant contacts."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ Array = NDArray[np.float64]
 SIX_DIRECTIONS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
 """±x, ±y, ±z, shape (6, 3)."""
 
-# residual of the balance, as a share of the weight
+# largest residual of the balance, relative to the weight
 _BALANCED = 1e-5
-# a spring to the ground, as a share of k_n: of motions no contact feels, the smallest is taken
+# stiffness of a regularising spring to the ground, relative to k_n: selects the smallest of undetermined motions
 _GROUND = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class GravityResponse:
-    """Answer of `gravity_displacement`, one entry a direction.
+    """Result of `gravity_displacement`, one entry per direction.
 
     Attributes:
-        held: Whether the contacts can carry the weight at all, shape (D,).
+        held: Whether the contacts can carry the weight with any forces, shape (D,).
         displacements: Displacement of the centre [m], shape (D, 3); infinite where not held.
         rotations: Small rotation vectors [rad], shape (D, 3); infinite where not held.
         forces: Contact forces in the contacts' frames (f_t₁, f_t₂, f_n, τ_n) [N, N m], shape (D, C, 4); NaN where
             not held.
-        residual: Unbalanced wrench over the weight, after the solve, shape (D,); infinite where not held.
-        lift: Times the weight that the contacts hold with normal forces of ``squeeze`` in all, shape (D,).
+        residual: Unbalanced wrench divided by the weight, after the solve, shape (D,); infinite where not held.
+        lift: Multiple of the weight that the contacts hold with a total normal force of ``squeeze``, shape (D,).
     """
 
     held: NDArray[np.bool_]
@@ -54,7 +54,7 @@ class GravityResponse:
 
     @property
     def worst(self) -> float:
-        """The largest of them [m]; infinite where a direction is not held."""
+        """Largest displacement over all directions [m]; infinite where a direction is not held."""
         return float(self.distance.max())
 
 
@@ -71,7 +71,7 @@ def gravity_displacement(
     directions: ArrayLike = SIX_DIRECTIONS,
     edges: int = 8,
 ) -> GravityResponse:
-    """Displacement of the object when gravity acts along each direction in turn, the hand standing still.
+    """Displacement of the object when gravity acts along each direction in turn, with the hand fixed.
 
     Every contact is a spring K = diag(k_t, k_t, k_n, k_s) of the skin behind a Coulomb cone. The object's small motion
     ξ = (v, ω) changes the forces f_i from their preload f⁰_i (Cutkosky & Kao 1989, "Computing and controlling the
@@ -89,15 +89,15 @@ def gravity_displacement(
     without closure. Without slip ξ = −(G K Gᵀ)⁻¹(−w) exactly. Where even unbounded forces in the discretised cones
     cannot carry w, the object is not held.
 
-    ``lift`` asks for no stiffness: it is `resisted_wrench` for the weight with a budget of ``squeeze``, the largest
-    factor λ for which forces in the cones, whose normal parts sum to ``squeeze`` at most, balance λ w. Above 1 the hand
-    lifts the object, slowly; above 1 + a/g also with the acceleration a.
+    ``lift`` does not depend on stiffness: it is `resisted_wrench` for the weight with a budget of ``squeeze``, the
+    largest factor λ for which forces in the cones, whose normal components sum to ``squeeze`` at most, balance λ w.
+    Above 1 the hand can lift the object slowly; above 1 + a/g also with acceleration a.
 
     Args:
         contacts: C contacts.
         center: Centre of mass [m].
         mass: Mass of the object [kg].
-        torque_scale: Length [m] that brings torques to forces and rotations to lengths; conditions the solve only.
+        torque_scale: Length [m] that converts torques to forces and rotations to lengths; for conditioning only.
         squeeze: Sum of the normal forces before gravity acts [N].
         normal_stiffness: k_n of a contact [N/m]; the default is a finger pulp's under load (reported about 3.5 N/mm).
         tangential_stiffness: k_t [N/m]; the default is k_n (2 − 2ν)/(2 − ν), ν = 0.48 (Mindlin 1949). Torsion has
@@ -171,7 +171,7 @@ class _Springs:
         safe = np.where(self._roots > 0.0, self._roots, 1.0)
         start = np.where(self._roots > 0.0, preload / safe, 0.0)
         weight = float(np.linalg.norm(load))
-        unit = weight / float(self._roots[:, 2].max() ** 2)  # how far one spring gives: the scale of the unknowns
+        unit = weight / float(self._roots[:, 2].max() ** 2)  # deflection of one spring: scale of the unknowns
 
         def potential(x: Array) -> tuple[float, Array]:
             scaled = self._project(start - np.einsum("cij,i->cj", self._map, x * unit))[0]
@@ -198,7 +198,7 @@ class _Springs:
         return motion, scaled * self._roots, float(residual)
 
     def _project(self, forces: Array) -> tuple[Array, Array]:
-        """Scaled forces (C, 4) brought into their cones |y_t| ≤ m y_n, and the derivative (C, 4, 4) of doing so."""
+        """Projection of scaled forces (C, 4) on their cones |y_t| ≤ m y_n, and its derivative (C, 4, 4)."""
         tangential, normal, slope = forces[:, (0, 1, 3)], forces[:, 2], self._slope
         length = np.linalg.norm(tangential, axis=1)
         along = tangential / np.maximum(length, 1e-300)[:, None]

@@ -1,4 +1,4 @@
-"""How deep hand and object are inside one another."""
+"""Penetration of hand and object: depths in both directions, and common volume."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Penetration", "penetration"]
 
 @dataclass(frozen=True)
 class Penetration:
-    """Answer of `penetration`.
+    """Result of `penetration`.
 
     Attributes:
         skin: Depth of the deepest skin vertex inside the object [m]; 0 where none is.
@@ -36,18 +36,19 @@ class Penetration:
 
 
 def penetration(both: HandObjectGaps, vertices: NDArray[np.floating]) -> Penetration:
-    """Penetration of a deformed hand and an object, looked at from both sides.
+    """Penetration of a deformed hand and an object, measured in both directions.
 
     With d_O the signed distance to the object, d_S that to the skin, negative inside,
 
         skin = max(0, −min d_O(skin vertices)),   thing = max(0, −min d_S(object's outline)),
 
-    the two halves of a depth by points (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one), the outline being
-    the object's vertices and points of its sharp edges (`warpjld.grasp.outline_points`): a finger with few
-    vertices does not hide the edge of a box that cuts into it.
+    a pointwise depth in both directions (Zhang, Kim, Varadhan & Manocha 2007 compute the exact one). The outline is the
+    object's vertices and points of its sharp edges (`warpjld.grasp.outline_points`), so that the edge of a box that
+    enters a finger between the finger's vertices is found.
 
     Args:
-        both: Hand and object, which is at its own place. The hand's skin may be open, as at the wrist.
+        both: Distances between hand and object, which is at its own placement. The hand's skin may be open, as at the
+            wrist.
         vertices: The deformed skin [m], shape (V, 3).
     """
     inside = intersection_beside(both.covering, both.thing.place.to_local(vertices)[0], both.near)

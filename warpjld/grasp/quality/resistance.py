@@ -1,4 +1,4 @@
-"""The largest disturbance a grasp resists in one given direction."""
+"""Task-oriented grasp quality: the largest disturbance that a grasp resists in one given direction."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def resisted_wrench(
     budget: float = 1.0,
     edges: int = 8,
 ) -> float:
-    """How many times an external wrench can be balanced by normal forces of a given sum.
+    """Largest multiple of an external wrench that contact forces with a bounded sum of normal forces can balance.
 
     The task-oriented measure (Roa & Suárez 2015, §2.2.4; Li & Sastry 1988) for a single disturbance w, by the linear
     program

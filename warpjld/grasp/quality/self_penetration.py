@@ -1,4 +1,4 @@
-"""How deep parts of a hand are inside one another."""
+"""Self-penetration depth of a hand: digits and palm inside one another."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.geometry.normals import vertex_normals
-from warpjld.grasp.kept import kept_with
+from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.objects import Places
 from warpjld.grasp.posed_skins import PosedSkins
 
@@ -15,8 +15,8 @@ __all__ = ["self_penetration"]
 
 Array = NDArray[np.float64]
 
-_OFF = 1e-5  # a point this far outside its own skin is asked whether it is inside another part's [m]
-_TOGETHER = 200_000  # pairs of points and triangles at a time
+_OFF = 1e-5  # offset along the normal, out of its own skin, of a vertex that is tested against other parts [m]
+_TOGETHER = 200_000  # pairs of points and triangles per batch
 
 
 def self_penetration(covering: Covering, vertices: NDArray[np.floating]) -> float:
@@ -27,8 +27,8 @@ def self_penetration(covering: Covering, vertices: NDArray[np.floating]) -> floa
 
         depth = max over parts A, B that cross, p of A inside:  min over x on the skin of B  ‖p − x‖.
 
-    DexGraspNet (Wang et al. 2023) takes keypoints as spheres instead; here every vertex of the skin counts. Skin that
-    folds within one part is not looked at.
+    DexGraspNet (Wang et al. 2023) tests spheres at keypoints instead; here every vertex of the skin counts. Folds
+    within one part are ignored.
 
     Args:
         covering: The hand.
@@ -47,10 +47,10 @@ def self_penetration(covering: Covering, vertices: NDArray[np.floating]) -> floa
         asked = owned[part]
         inside = asked[posed.distances(skin, points[asked] + _OFF * normals[asked], np.inf)[0] < 0.0]
         for other in np.flatnonzero(crossing[part]).tolist():
-            # where parts meet, vertices are both's
+            # vertices on the border of two parts belong to both
             own = inside[~np.isin(inside, owned[other])]
             near = _distances(points[own], points[faces[posed.parts.of_face == other]])
-            # inside of a third part a point may be far from this one: deeper than its skin lies no point
+            # a point may be inside a third part and far from this one: count it only where this part is the nearest
             mine = _distances(points[own], points[faces[~np.isin(posed.parts.of_face, [part, other])]])
             deepest = max(deepest, float(near[near <= mine].max(initial=0.0)))
     return deepest
@@ -63,9 +63,9 @@ def _distances(points: Array, triangles: Array) -> Array:
     found = np.full(len(points), np.inf)
     step = max(1, _TOGETHER // max(len(triangles), 1))
     for first in range(0, len(points) if len(triangles) else 0, step):
-        some = points[first : first + step]
-        pairs = np.repeat(some, len(triangles), axis=0)
-        nearest = closest_point(np.tile(triangles, (len(some), 1, 1)), pairs)
-        gaps = np.linalg.norm(nearest - pairs, axis=1).reshape(len(some), -1)
+        batch = points[first : first + step]
+        pairs = np.repeat(batch, len(triangles), axis=0)
+        nearest = closest_point(np.tile(triangles, (len(batch), 1, 1)), pairs)
+        gaps = np.linalg.norm(nearest - pairs, axis=1).reshape(len(batch), -1)
         found[first : first + step] = gaps.min(axis=1)
     return found

@@ -1,4 +1,4 @@
-"""Where skin touches an object: patches of contact with their digit, normals and area."""
+"""Contact patches of skin on an object: one per part of the hand, with centre, normals and area."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ContactPatches:
-    """P patches of skin in contact, one for each part of the hand that touches.
+    """P contact patches, one for each part of the hand that touches.
 
     Attributes:
         names: Part of each patch, e.g. ``index.knuckle3``.
         points: Centre of each patch on the object [m], shape (P, 3).
         normals: Unit normal of the object there, pointing into it, shape (P, 3).
-        skin_normals: Unit normal of the skin, pointing out of the hand, shape (P, 3). Where skin lies flat on the
-            object it equals ``normals``.
+        skin_normals: Mean unit normal of the skin, pointing out of the hand, shape (P, 3). Equals ``normals`` where the
+            skin lies flat on the object.
         areas: Area of skin in contact [m²], shape (P,).
         vertices: Number of skin vertices in contact, shape (P,).
     """
@@ -63,23 +63,23 @@ def contact_patches(
     *,
     tolerance: float,
 ) -> ContactPatches:
-    """Patches of skin nearer to the object than a tolerance, one a part.
+    """Patches of skin within a tolerance of the object, one per part.
 
-    A vertex i in contact (signed distance d_i ≤ tolerance) stands for a third of the triangles around it, A_i (Meyer,
-    Desbrun, Schröder & Barr 2003, barycentric areas). Over the vertices in contact of one part:
+    A vertex i in contact (signed distance d_i ≤ tolerance) represents its barycentric area A_i, a third of the
+    triangles around it (Meyer, Desbrun, Schröder & Barr 2003). Over the vertices in contact of one part:
 
         area = Σ A_i,   point = Σ A_i p_i / Σ A_i,   normal ∝ −Σ A_i n_i,   skin normal ∝ Σ A_i s_i,
 
-    p_i the nearest points of the object, n_i its outward normals there, s_i the skin's. A part whose normals cancel has
-    no direction to push in, and is left out.
+    p_i the nearest points of the object, n_i its outward normals there, s_i the skin's normals. A part whose normals
+    cancel has no direction to push in, and is left out.
 
     Args:
         vertices: Deformed skin [m], shape (V, 3).
         faces: Its triangles, shape (T, 3).
-        parts: Part of every vertex, shape (V,); -1 where a vertex is of no interest.
+        parts: Part of every vertex, shape (V,); -1 for vertices to be ignored.
         names: Names of the parts.
         distances: Signed distance of every vertex to the object [m], negative inside, shape (V,).
-        nearest: Nearest points of the object [m], shape (V, 3); only those in contact are looked at.
+        nearest: Nearest points of the object [m], shape (V, 3); only those of vertices in contact are used.
         outward: The object's unit normals there, shape (V, 3).
         tolerance: Largest distance that counts as contact [m].
 
@@ -122,7 +122,7 @@ def contact_patches(
 
 
 def vertex_areas(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> Array:
-    """A third of the area of the triangles around each vertex [m²], shape (V,)."""
+    """Barycentric vertex areas: a third of the area of the triangles around each vertex [m²], shape (V,)."""
     a, b, c = (np.asarray(vertices, dtype=np.float64)[faces[:, k]] for k in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices)).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Grasp wrench space: the wrenches a grasp can balance with bounded normal forces; its epsilon and its volume."""
+"""Grasp wrench space: the wrenches that bounded normal forces can exert; its epsilon and volume (Ferrari & Canny)."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ __all__ = ["WrenchSpace", "least_resistance", "wrench_space"]
 
 Array = NDArray[np.float64]
 
-# facets of a hull in six dimensions grow with the cube of its points: beyond this it takes minutes
+# the number of facets of a hull in six dimensions grows with the cube of its points: more points take minutes
 _MOST_POINTS = 6_000
-_SHAKE = 1e-9
-_GROWN = 1e-12  # of the largest coordinate: what is farther beyond a facet makes the hull grow
-_TOGETHER = 8  # facets that it grows at together
+_SHAKE = 1e-9  # relative size of the perturbation of degenerate points
+_GROWN = 1e-12  # distance beyond a facet, relative to the largest coordinate, from which a point is added to the hull
+_TOGETHER = 8  # facets that are tested per step
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +32,12 @@ class WrenchSpace:
     """Measures of the grasp wrench space, for normal forces of at most 1 N.
 
     Attributes:
-        epsilon: Radius of the largest ball about the origin inside it [N]: the worst wrench it resists; 0 without
-            force closure.
+        epsilon: Radius of the largest ball about the origin inside it [N]: the magnitude of the smallest wrench that
+            can break the grasp; 0 without force closure.
         volume: Its six-dimensional volume [N⁶]; 0 where the wrenches span fewer dimensions.
-        weakest: Unit wrench the grasp exerts with least force: the normal of the nearest facet, shape (6,); zeros
-            where epsilon is 0.
-        norm: How normal forces are bounded, as asked for; likewise ``torque_scale`` and ``edges``.
+        weakest: Unit wrench in the direction in which the grasp is weakest: the normal of the nearest facet, shape
+            (6,); zeros where epsilon is 0.
+        norm: How normal forces are bounded, as given; likewise ``torque_scale`` and ``edges``.
     """
 
     epsilon: float
@@ -65,7 +65,7 @@ def wrench_space(
         Linf:  conv(W_1 ∪ {0}) ⊕ … ⊕ conv(W_C ∪ {0})    each normal force is at most 1 N,
 
     epsilon the distance from the origin to its boundary and volume its volume (Miller & Allen 1999; Roa & Suárez 2015,
-    §2.2.2). Both depend on norm, ρ, friction and edges; hence none has a hidden default but the number of edges.
+    §2.2.2). Both depend on norm, ρ, friction and edges, which are therefore part of the result.
 
     Args:
         contacts: C contacts.
@@ -89,16 +89,16 @@ def wrench_space(
     nearest = int(hull.equations[:, -1].argmax())  # facets are n·w + b ≤ 0: the origin lies −b inside
     epsilon = -float(hull.equations[nearest, -1])
     volume = float(hull.volume)
-    if epsilon <= 10.0 * _SHAKE:  # the origin is always a point of the set; on its boundary, nothing is resisted there
+    if epsilon <= 10.0 * _SHAKE:  # the origin, always a point of the set, is on its boundary
         return WrenchSpace(0.0, volume, np.zeros(6), norm, torque_scale, edges)
     return WrenchSpace(epsilon, volume, hull.equations[nearest, :-1].copy(), norm, torque_scale, edges)
 
 
 def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: float, edges: int = 8) -> float:
-    """Epsilon of ``wrench_space`` for norm "L1" alone [N], sooner: 0 without force closure.
+    """Epsilon [N] of ``wrench_space`` for norm "L1", without the volume and therefore faster; 0 without force closure.
 
-    The hull of a few wrenches grows: where a wrench lies beyond one of its nearest facets, the farthest is added to
-    it, until the nearest facet has none beyond it and so is one of the whole hull.
+    An incremental hull: starting from a few wrenches, the farthest wrench beyond each of the nearest facets is added,
+    until none lies beyond the nearest facet, which is then a facet of the full hull.
 
     Args:
         contacts: C contacts.
@@ -131,14 +131,14 @@ def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: flo
 
 
 def _independent(points: Array) -> NDArray[np.integer]:
-    """Six of points (k, 6) that span all dimensions, so that a hull of them and the origin is not flat."""
+    """Indices of six linearly independent points of (k, 6); with the origin they form a hull that is not flat."""
     from scipy.linalg import qr
 
     return np.asarray(qr(points.T, mode="r", pivoting=True)[1][:6])
 
 
 def _hull(points: Array) -> ConvexHull:
-    """Convex hull; points so regular that qhull cannot order its facets are shaken by 1e-9 of their size."""
+    """Convex hull; points on which qhull fails because of symmetry are perturbed by 1e-9 of their size."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -149,10 +149,16 @@ def _hull(points: Array) -> ConvexHull:
 
 
 def _union(blocks: list[Array]) -> Array:
+    """The origin and all primitive wrenches, shape (k, 6)."""
     return np.concatenate([np.zeros((1, 6)), *(block.T for block in blocks)])
 
 
 def _minkowski_sum(blocks: list[Array]) -> Array:
+    """Sums of one point of {0} ∪ W_i for every contact i, shape (k, 6).
+
+    Raises:
+        InputError: More than ``_MOST_POINTS`` sums.
+    """
     counts = [block.shape[1] + 1 for block in blocks]
     if prod(counts) > _MOST_POINTS:
         raise InputError(

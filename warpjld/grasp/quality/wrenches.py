@@ -1,4 +1,4 @@
-"""The grasp matrix, and the wrenches the edges of the friction cones exert on the object."""
+"""Grasp matrix, and primitive wrenches: what the edges of the friction cones exert on the object."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["contact_wrenches", "grasp_matrix", "has_full_rank"]
 
 Array = NDArray[np.float64]
 
-# singular values below this share of the largest are rounding: wrenches of real grasps stay above 1e-4
+# smallest relative singular value that counts for the rank; wrenches of real grasps stay above 1e-4
 _RANK = 1e-9
 
 

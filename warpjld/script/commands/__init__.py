@@ -1,1 +1,1 @@
-"""The built-in commands, one subject a file; importing a file adds its commands to the registry."""
+"""The built-in commands, one subject per file; importing a file registers its commands."""

@@ -1,4 +1,4 @@
-"""Bringing rigs on stage, and what belongs to their skeletons: axes, limits, recorded motion."""
+"""Commands that add actors (rigs) to the scene, and set their axes, limits, initial angles and recorded motion."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
         ' or HAND <LEFT/RIGHT> "<rig file>" [UNIT <M/CM/MM or metres>] [SCALE <factor>] [MAP "<joint map>"]'
         " [NAME <actor>]"
     ),
-    help="Bring on a hand: the built-in one, or a rig from a file. The actor is called LEFT or RIGHT unless named.",
+    help="Add a hand to the scene: the built-in one, or a rig from a file. It is called LEFT or RIGHT unless named.",
     group="Actors",
 )
 def hand(scene: Scene, arguments: Arguments) -> None:
-    """Bring on a hand: the built-in one, or a rig from a file. The actor is called LEFT or RIGHT unless named (R7)."""
+    """Add a hand to the scene: the built-in one, or a rig from a file (R7)."""
     side: Literal["left", "right"] = "left" if arguments.choice("the side", SIDES) == "LEFT" else "right"
     if arguments.keyword("BUILTIN"):
         from warpjld.hand.kept import kept_hand
@@ -62,11 +62,11 @@ def hand(scene: Scene, arguments: Arguments) -> None:
         'BODY BUILTIN [HEIGHT <metres>] [NAME <actor>] or BODY "<rig file>" [UNIT <M/CM/MM or metres>]'
         ' [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]'
     ),
-    help="Bring on a rig with any skeleton: the built-in body, an animal. The actor is called BODY unless named.",
+    help="Add a rig with any skeleton: the built-in body, or a file's. The actor is called BODY unless named.",
     group="Actors",
 )
 def body(scene: Scene, arguments: Arguments) -> None:
-    """Bring on a rig with any skeleton (R12, R30)."""
+    """Add a rig with any skeleton to the scene (R12, R30)."""
     if arguments.keyword("BUILTIN"):
         from warpjld.hand.figure import build_body
 
@@ -89,11 +89,11 @@ def body(scene: Scene, arguments: Arguments) -> None:
         'MODEL "<surface file>" <SKELETON/POINTS> "<skeleton or points file>" [UNIT <M/CM/MM or metres>]'
         ' [SCALE <factor>] [MAP "<joint map>"] [NAME <actor>]'
     ),
-    help="Bring on a bare surface with a skeleton or named points. The actor is called MODEL unless named.",
+    help="Add a surface without joints, with a skeleton file or a points file. It is called MODEL unless named.",
     group="Actors",
 )
 def model(scene: Scene, arguments: Arguments) -> None:
-    """Bring on a bare surface with a skeleton or named points. The actor is called MODEL unless named (R12, R17)."""
+    """Add a surface without joints, with a skeleton file or a points file (R12, R17)."""
     path = arguments.input_file("a surface file")
     kind = arguments.choice("SKELETON or POINTS", ("SKELETON", "POINTS")).lower()
     joints = arguments.input_file(f"a {kind} file")
@@ -105,18 +105,18 @@ def model(scene: Scene, arguments: Arguments) -> None:
 @command(
     "ACTOR",
     syntax="ACTOR <name>",
-    help="Commands that follow speak to this actor where more than one could be meant.",
+    help="Make this actor the current one: later commands that name no actor apply to it.",
     group="Actors",
 )
 def actor(scene: Scene, arguments: Arguments) -> None:
-    """Commands that follow speak to this actor where more than one could be meant (R89)."""
+    """Make an actor the current one: later commands that name no actor apply to it (R89)."""
     scene.current = scene.actor(arguments.name("an actor's name")).name
 
 
 @command(
     "MOTION",
     syntax='MOTION "<motion file>" [SIDE <LEFT/RIGHT>] [ANIMATION "<name>"] [FLAT_HAND_MEAN <ON/OFF>]',
-    help="Drive the current actor by a motion file instead of keys, at the RATE set before.",
+    help="Drive the current actor by a motion file instead of keys, sampled at the RATE set before.",
     group="Actors",
 )
 def motion(scene: Scene, arguments: Arguments) -> None:
@@ -155,7 +155,7 @@ def axis(scene: Scene, arguments: Arguments) -> None:
         x, y, z = direction
         raise arguments.error(
             f"{chosen.skeleton.names[joint]} cannot bend about its own segment, which lies along "
-            f"{x:.2f} {y:.2f} {z:.2f}: the axis wants to be across it"
+            f"{x:.2f} {y:.2f} {z:.2f}: want an axis across it"
         )
     axes = chosen.skeleton.axes.copy()
     axes[joint] = vector
@@ -165,11 +165,11 @@ def axis(scene: Scene, arguments: Arguments) -> None:
 @command(
     "LIMIT",
     syntax="LIMIT <joint> <FLEXION/PIVOT/TWISTING/ABDUCTION> <smallest> <largest>",
-    help="How far a joint may go, in degrees; the largest flexion also scales inflation.",
+    help="Limits of a joint's angle in degrees; the largest flexion also scales inflation.",
     group="Actors",
 )
 def limit(scene: Scene, arguments: Arguments) -> None:
-    """How far a joint may go, in degrees; the largest flexion also scales inflation (R24, R59)."""
+    """Limits of a joint's angle in degrees; the largest flexion also scales inflation (R24, R59)."""
     chosen, joint = read_joint(scene, arguments)
     channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
     low = arguments.number("the smallest angle", minimum=-360, maximum=360)
@@ -184,11 +184,11 @@ def limit(scene: Scene, arguments: Arguments) -> None:
 @command(
     "INITIAL",
     syntax="INITIAL <joint> <FLEXION/PIVOT/TWISTING/ABDUCTION> <degrees>",
-    help="Angle of a joint in the digitised pose: limits, keys and inflation count from the straight joint.",
+    help="Angle of a joint in the rest pose of the file; limits, keys and inflation count from the straight joint.",
     group="Actors",
 )
 def initial(scene: Scene, arguments: Arguments) -> None:
-    """R25."""
+    """Set the angle that a joint has in the rest pose of the file; angles count from the straight joint (R25)."""
     chosen, joint = read_joint(scene, arguments)
     channel = arguments.choice("the angle", [c.upper() for c in CHANNELS])
     degrees = arguments.number("the angle at rest in degrees", minimum=-360, maximum=360)
@@ -209,7 +209,7 @@ def initial(scene: Scene, arguments: Arguments) -> None:
 
 
 def _options(arguments: Arguments) -> dict[str, object]:
-    """How to read a rig file, and the actor's name: keyword arguments of ``load_rig``, and ``name``."""
+    """Read the options of a rig file: keyword arguments of ``load_rig``, and ``name`` of the actor."""
     options = arguments.options(
         unit=lambda: _unit(arguments),
         scale=lambda: arguments.number("the scale", above=0.0),
@@ -219,12 +219,13 @@ def _options(arguments: Arguments) -> dict[str, object]:
     if "map" in options:
         options["joint_map"] = options.pop("map")
     metres = options.get("unit")
-    if isinstance(metres, float):  # so many metres: a factor like any other
+    if isinstance(metres, float):  # a unit in metres is a scale
         options["unit"], options["scale"] = "m", metres * float(str(options.get("scale", 1.0)))
     return options
 
 
 def _unit(arguments: Arguments) -> str | float:
+    """Read a unit: one of ``METRES`` in lower case, or its length [m]."""
     if arguments.has_number():
         return arguments.number("the unit in metres", above=0.0)
     return arguments.choice("the unit, or its length in metres", [u.upper() for u in METRES]).lower()

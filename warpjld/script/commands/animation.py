@@ -1,4 +1,4 @@
-"""Key values of joint angles (A §9, R79–R84), and of whole actors."""
+"""Commands that set keys of joint angles (A §9, R79–R84), and of the placement of actors and objects."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ _KEYS = "<key1> <key2> <step> <degrees>"
 
 
 def _limb(scene: Scene, arguments: Arguments, joint: str, channels: Sequence[str]) -> None:
+    """Read side, channel and keys of a joint of an arm, and set the keys."""
     side, channel = arguments.choices(SIDES, channels)
     set_keys(scene.actor_with(side), [f"{side}.{joint}"], channel, scene.spline, arguments)
 
@@ -108,11 +109,11 @@ def joint_(scene: Scene, arguments: Arguments) -> None:
 @command(
     "MOVE",
     syntax="MOVE <actor or object> <key> <x> <y> <z>",
-    help="Displacement of an actor or an object from its rest place at a key, in metres.",
+    help="Displacement of an actor or an object from its initial position at a key, in metres.",
     group="Animation",
 )
 def move(scene: Scene, arguments: Arguments) -> None:
-    """Displacement of an actor or an object from its rest place at a key, in metres (R89)."""
+    """Displacement of an actor or an object from its initial position at a key, in metres (R89)."""
     placement = scene.placement(arguments.name("an actor's or an object's name"))
     key = arguments.number("the key (a frame)")
     for axis, value in zip("xyz", arguments.vector("the displacement's"), strict=True):
@@ -136,11 +137,11 @@ def turn(scene: Scene, arguments: Arguments) -> None:
 @command(
     "SPLINE",
     syntax="SPLINE <tension> [<continuity> <bias>]",
-    help="Kochanek–Bartels constants, −1 to 1, of the keys set from here on; 0 0 0 at first.",
+    help="Kochanek–Bartels constants, −1 to 1, of the keys set after this line; 0 0 0 by default.",
     group="Animation",
 )
 def spline(scene: Scene, arguments: Arguments) -> None:
-    """Kochanek–Bartels constants, −1 to 1, of the keys set from here on; 0 0 0 at first (R3)."""
+    """Kochanek–Bartels constants, −1 to 1, of the keys set after this line; 0 0 0 by default (R3)."""
     tension = arguments.number("the tension", minimum=-1, maximum=1)
     if not arguments:
         scene.spline = SplineConstants(tension)
@@ -152,11 +153,11 @@ def spline(scene: Scene, arguments: Arguments) -> None:
 @command(
     "FRAMES",
     syntax="FRAMES <first> <last>",
-    help="Frames to make, both included; without it, from the first key to the last.",
+    help="Frames to compute, both included; without this command, from the first key to the last.",
     group="Animation",
 )
 def frames(scene: Scene, arguments: Arguments) -> None:
-    """Frames to make, both included; without it, from the first key to the last (R4)."""
+    """Frames to compute, both included; without this command, from the first key to the last (R4)."""
     first = arguments.integer("the first frame")
     last = arguments.integer("the last frame")
     if last < first:
@@ -164,7 +165,7 @@ def frames(scene: Scene, arguments: Arguments) -> None:
     scene.first, scene.last = first, last
 
 
-@command("RATE", syntax="RATE <frames a second>", help="Frames a second; 30 at first.", group="Animation")
+@command("RATE", syntax="RATE <frames a second>", help="Frames per second; 30 by default.", group="Animation")
 def rate(scene: Scene, arguments: Arguments) -> None:
-    """Frames a second; 30 at first (R2)."""
+    """Frames per second; 30 by default (R2)."""
     scene.rate = arguments.number("the rate in frames a second", above=0, maximum=1000)

@@ -1,4 +1,4 @@
-"""How the surface follows: the animator's parameters and the method (A §3, R22, R23)."""
+"""Commands for the covering: parameters, method, domains, contact for display (A §3, R22, R23)."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from warpjld.script.scene import Scene
 @command(
     "PARAMETER",
     syntax=("PARAMETER [LEFT/RIGHT] <joint or ALL> <INFLATION/PROXIMITY/MUSCLE/PEAK/EXPONENTS/PALM> <value> [<value>]"),
-    help="A parameter of a joint; PROXIMITY and EXPONENTS take two values.",
+    help="Set a parameter of a joint; PROXIMITY and EXPONENTS take two values.",
     group="Covering",
 )
 def parameter(scene: Scene, arguments: Arguments) -> None:
-    """A parameter of a joint; PROXIMITY and EXPONENTS take two values (R22, R65)."""
+    """Set a parameter of a joint; PROXIMITY and EXPONENTS take two values (R22, R65)."""
     side = arguments.keyword(*SIDES)
     if arguments.keyword("ALL"):
         actor = scene.actor_with(side) if side else scene.actor()
@@ -44,11 +44,11 @@ def parameter(scene: Scene, arguments: Arguments) -> None:
 @command(
     "PARAMETERS",
     syntax='PARAMETERS "<parameter file>"',
-    help="All parameters of the current actor from a file, as warpjld calibrate writes it.",
+    help="Read all parameters of the current actor from a file that warpjld calibrate wrote.",
     group="Covering",
 )
 def parameters(scene: Scene, arguments: Arguments) -> None:
-    """All parameters of the current actor from a file, as warpjld calibrate writes it (R23)."""
+    """Read all parameters of the current actor from a file that ``warpjld calibrate`` wrote (R23)."""
     from warpjld.covering.parameters import load_parameters
 
     actor = scene.actor()
@@ -59,11 +59,11 @@ def parameters(scene: Scene, arguments: Arguments) -> None:
 @command(
     "METHOD",
     syntax="METHOD <SMOOTH/PAPER>",
-    help="Covering of the current actor: soft domain borders, or one segment per vertex as published.",
+    help="Method of the current actor's covering: smooth domain borders, or the paper's one segment per vertex.",
     group="Covering",
 )
 def method(scene: Scene, arguments: Arguments) -> None:
-    """Covering of the current actor: soft domain borders, or one segment per vertex as published (R16)."""
+    """Method of the current actor's covering: smooth domain borders, or the paper's one segment per vertex (R16)."""
     actor = scene.actor()
     chosen = arguments.choice("the method", ("SMOOTH", "PAPER"))
     actor.method = "paper" if chosen == "PAPER" else "smooth"
@@ -72,11 +72,11 @@ def method(scene: Scene, arguments: Arguments) -> None:
 @command(
     "DOMAINS",
     syntax="DOMAINS <GEOMETRY/SKIN>",
-    help="Where the current actor's domains come from: its shape alone, or the rig's painted weights.",
+    help="Source of the current actor's domains: the surface's geometry, or the rig's painted weights.",
     group="Covering",
 )
 def domains(scene: Scene, arguments: Arguments) -> None:
-    """Where the current actor's domains come from: its shape alone, or the rig's painted weights (R16)."""
+    """Source of the current actor's domains: the surface's geometry, or the rig's painted weights (R16)."""
     actor = scene.actor()
     chosen = arguments.choice("the source of domains", ("GEOMETRY", "SKIN"))
     if chosen == "SKIN" and actor.rig.skin is None:
@@ -88,12 +88,12 @@ def domains(scene: Scene, arguments: Arguments) -> None:
     "TOUCH",
     syntax="TOUCH <ON/OFF/LIMIT>",
     help=(
-        "Skin that crosses or lies in objects is parted, for display (PRESS solves contact); "
-        "LIMIT: digits close until they touch."
+        "Push skin out of other skin and out of objects, for display only (PRESS solves contact); "
+        "LIMIT: digits also stop where they touch."
     ),
     group="Covering",
 )
 def touch(scene: Scene, arguments: Arguments) -> None:
-    """Contact of the skin without finite elements."""
+    """Contact of the skin for display, without finite elements."""
     words: dict[str, Literal["on", "off", "limit"]] = {"ON": "on", "OFF": "off", "LIMIT": "limit"}
     scene.actor().touch = words[arguments.choice("whether skin is parted", tuple(words))]

@@ -1,4 +1,4 @@
-"""State variables of object points, and shapes deformed by formula (B §3.1, §3.4, R94, R128, R129)."""
+"""Commands for prescribed displacements of object points, and Barr's deformations (B §3.1, §3.4, R94, R128, R129)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpjld.suggest import did_you_mean
 
 _KEYS = "<key1> <key2> <step>"
 _AXES = ("X", "Y", "Z")
-_SOME = ("X", "Y", "Z", "XY", "XZ", "YZ")
+_AXIS_SETS = ("X", "Y", "Z", "XY", "XZ", "YZ")
 
 
 @command(
@@ -25,11 +25,11 @@ _SOME = ("X", "Y", "Z", "XY", "XZ", "YZ")
         "POINTS <object> <name> <UPPER/LOWER> <X/Y/Z> <share> or POINTS <object> <name> NEAR <x> <y> <z> <radius> "
         "or POINTS <object> <name> ALL"
     ),
-    help="A name for points of a physical object: an end along one of its axes, those near a place on the stage, all.",
+    help="Name a set of points of a physical object: one end along an axis, those near a world position, or all.",
     group="Contact",
 )
 def points(scene: Scene, arguments: Arguments) -> None:
-    """A name for points of a physical object (R128)."""
+    """Name a set of points of a physical object (R128)."""
     prop = read_object(scene, arguments)
     if prop.name not in scene.contact.physical:
         raise arguments.error(f"{prop.name} is not physical: make it so with PHYSICAL {prop.name}")
@@ -50,11 +50,11 @@ def points(scene: Scene, arguments: Arguments) -> None:
 @command(
     "VECTOR",
     syntax=f"VECTOR <object> <points> {_KEYS} <x> <y> <z>",
-    help="Displacement of object points in all directions at key1, key1 + step, … up to key2 [m]; free before that.",
+    help="Prescribe the displacement of object points at key1, key1 + step, … up to key2 [m]; free before key1.",
     group="Contact",
 )
 def vector(scene: Scene, arguments: Arguments) -> None:
-    """Displacement of object points in all directions at key1, key1 + step, … up to key2 [m] (R128)."""
+    """Prescribe the displacement of object points at key1, key1 + step, … up to key2 [m] (R128)."""
     state = _state(scene, arguments)
     keys, first = arguments.keys_and_value("the displacement's x")
     values = (first, arguments.number("the displacement's y"), arguments.number("the displacement's z"))
@@ -64,14 +64,14 @@ def vector(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "PARTIAL",
-    syntax=f"PARTIAL <object> <points> <{'/'.join(_SOME)}> {_KEYS} <value> [<value>]",
-    help="Displacement of object points along one or two axes only [m]; they stay free along the others.",
+    syntax=f"PARTIAL <object> <points> <{'/'.join(_AXIS_SETS)}> {_KEYS} <value> [<value>]",
+    help="Prescribe the displacement of object points along one or two axes only [m]; free along the others.",
     group="Contact",
 )
 def partial(scene: Scene, arguments: Arguments) -> None:
-    """Displacement of object points along one or two axes only [m]; they stay free along the others (R128)."""
+    """Prescribe the displacement of object points along one or two axes only [m]; free along the others (R128)."""
     state = _state(scene, arguments)
-    axes = arguments.choice("the axes", _SOME).lower()
+    axes = arguments.choice("the axes", _AXIS_SETS).lower()
     keys, value = arguments.keys_and_value(f"the displacement's {axes[0]}")
     _set(scene, state.tracks, axes[0], keys, value)
     for axis in axes[1:]:
@@ -81,11 +81,11 @@ def partial(scene: Scene, arguments: Arguments) -> None:
 @command(
     "HOLD",
     syntax="HOLD <object> <points> [<last frame>]",
-    help="Object points go where the object goes: MOVE, TURN, OBJECTS take them along; free after the last frame.",
+    help="Fix object points to the object's placement (MOVE, TURN, OBJECTS); free after the last frame.",
     group="Contact",
 )
 def hold(scene: Scene, arguments: Arguments) -> None:
-    """Object points go where the object goes: MOVE, TURN, OBJECTS take them along; free after the last frame (R129)."""
+    """Fix object points to the object's placement (MOVE, TURN, OBJECTS); free after the last frame (R129)."""
     state = _state(scene, arguments)
     state.held = True
     if arguments:
@@ -95,11 +95,11 @@ def hold(scene: Scene, arguments: Arguments) -> None:
 @command(
     "DEFORM",
     syntax=f"DEFORM <object> <TAPER/TWIST/BEND> <X/Y/Z> {_KEYS} <share or degrees>",
-    help="Formulas deform an object along one of its axes, by this much from end to end; bends lead to the next axis.",
+    help="Taper, twist or bend an object along an axis (Barr), by this from end to end; it bends to the next axis.",
     group="Contact",
 )
 def deform(scene: Scene, arguments: Arguments) -> None:
-    """Formulas deform an object along one of its axes, by this much from end to end (R94)."""
+    """Taper, twist or bend an object along one of its axes by Barr's formulas, by this much from end to end (R94)."""
     prop = read_object(scene, arguments)
     if prop.name in scene.contact.physical:
         raise arguments.error(f"{prop.name} is physical: forces deform it, not formulas")
@@ -118,10 +118,10 @@ def deform(scene: Scene, arguments: Arguments) -> None:
 
 
 def _state(scene: Scene, arguments: Arguments) -> PrescribedPoints:
-    """Read an object and its points."""
+    """Read an object and the name of its points; the prescribed displacement of these."""
     prop = read_object(scene, arguments)
     name = arguments.name("the name of points").upper()
-    known = [mine for one, mine in scene.contact.points if one == prop.name]
+    known = [points for owner, points in scene.contact.points if owner == prop.name]
     if name not in known:
         more = did_you_mean(name, known) or f"; name them with POINTS {prop.name} {name} …"
         raise arguments.error(f"{prop.name} has no points {name}{more}")

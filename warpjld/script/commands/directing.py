@@ -1,4 +1,4 @@
-"""Lamps, backdrop, colours and shots: the director's part (A8, R89, R135)."""
+"""Commands for lamps, backdrop, colours and shots (A8, R89, R135)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from warpjld.script.scene import Scene
 from warpjld.suggest import did_you_mean
 
 _KINDS = {"KEY": 0.9, "FILL": 0.35, "DIRECTIONAL": 0.7}
-"""Lamps, and how bright they are unless told."""
+"""Kinds of lamps and their default intensity, chosen by eye."""
 
 
 @command(
@@ -23,11 +23,11 @@ _KINDS = {"KEY": 0.9, "FILL": 0.35, "DIRECTIONAL": 0.7}
         'LIGHT <name> <KEY/FILL/DIRECTIONAL> FROM <x> <y> <z> [TO <x> <y> <z>] [COLOR "<colour>"] '
         "[INTENSITY <share>] [AT <frame>]"
     ),
-    help="A lamp on the stage [m], in place of the studio's; AT sets keys of its place and intensity.",
+    help="Add a lamp [m]; lamps replace the default lighting. AT sets keys of its position and intensity.",
     group="Output",
 )
 def light(scene: Scene, arguments: Arguments) -> None:
-    """A lamp on the stage, in place of the studio's (R135)."""
+    """Add a lamp; lamps replace the default lighting (R135)."""
     name = arguments.name("the lamp's name").upper()
     kind = arguments.choice("the kind of lamp", _KINDS)
     arguments.choice("FROM and the lamp's place", ("FROM",))
@@ -54,11 +54,11 @@ def light(scene: Scene, arguments: Arguments) -> None:
 @command(
     "BACKDROP",
     syntax='BACKDROP "<colour>" ["<colour above>"]',
-    help="What is behind everything: one colour, or one that goes over into another upwards.",
+    help="Background of pictures and films: one colour, or a vertical gradient of two.",
     group="Output",
 )
 def backdrop(scene: Scene, arguments: Arguments) -> None:
-    """What is behind everything (R135)."""
+    """Background of pictures and films (R135)."""
     below = read_color(arguments)
     scene.backdrop = below, read_color(arguments) if arguments else below
 
@@ -84,11 +84,11 @@ def color(scene: Scene, arguments: Arguments) -> None:
 @command(
     "SHOT",
     syntax="SHOT <name> <first> <last>",
-    help="Frames that a FILM with SHOTS shows through the CAMERA set before; those after it are for the next shot.",
+    help="Define a shot: a range of frames seen by the CAMERA set before. FILM … SHOTS shows shots in order.",
     group="Output",
 )
 def shot(scene: Scene, arguments: Arguments) -> None:
-    """Frames that a film with shots shows through the camera set before (R135)."""
+    """Define a shot: a range of frames seen by the camera set before (R135)."""
     name = arguments.new_name("the shot's name").upper()
     first, last = arguments.integer("the first frame"), arguments.integer("the last frame")
     if last < first:
@@ -99,7 +99,7 @@ def shot(scene: Scene, arguments: Arguments) -> None:
 
 
 def read_color(arguments: Arguments) -> str:
-    """A colour as ``#rrggbb``."""
+    """Read a colour; as ``#rrggbb``."""
     from warpjld.render.colors import as_hex
 
     name = arguments.text("a colour")

@@ -1,4 +1,4 @@
-"""Include files, messages, and looking at what there is. MACRO … END is part of the grammar."""
+"""Commands INCLUDE, PRINT, SHOW and HELP. MACRO … END is part of the grammar."""
 
 from __future__ import annotations
 
@@ -52,23 +52,23 @@ def print_(scene: Scene, arguments: Arguments) -> None:
         "SHOW VALUES <frame>, SHOW <WIREFRAME/SHADED> <frame>, SHOW DISTANCE <frame> <hand vertex> <object> <facet>, "
         "SHOW INTERSECTION <frame> <segment> <object> or SHOW <ACTORS/JOINTS/PARAMETERS/OUTPUTS>"
     ),
-    help="Values or a picture of a frame, a vertex beside a facet, a segment in an object, or what is on stage.",
+    help="Print joint values at a frame, make a picture of it, measure a distance or an intersection, or list things.",
     group="Flow",
 )
 def show_(scene: Scene, arguments: Arguments) -> None:
-    """Values at any frame; a picture of it, whose path is printed; or what is on stage (R4, R5)."""
+    """Print values at a frame, make a picture of it (prints its path), measure, or list what there is (R4, R5)."""
     topic = arguments.choice("what to show", _TOPICS)
     match topic:
         case "VALUES":
             frame = arguments.number("the frame")
-            scene.actor()  # says what to do where there is none
+            scene.actor()  # raises an error with advice if there is none
             for actor in scene.actors.values():
                 scene.say(show.values(actor, frame, scene.rate))
         case "WIREFRAME" | "SHADED":
             from warpjld.script.pictures import preview
 
             frame = arguments.number("the frame")
-            scene.actor()  # says what to do where there is none
+            scene.actor()  # raises an error with advice if there is none
             scene.say(str(preview(scene, frame, "shaded" if topic == "SHADED" else "wireframe")))
         case "DISTANCE" | "INTERSECTION":
             _measure(scene, arguments, topic)
@@ -83,7 +83,7 @@ def show_(scene: Scene, arguments: Arguments) -> None:
 
 
 def _measure(scene: Scene, arguments: Arguments, topic: str) -> None:
-    """R73, R75, R132."""
+    """Print the distance of a vertex to a facet, or the intersection of a segment with an object (R73, R75, R132)."""
     from warpjld.script import measures
 
     frame = arguments.number("the frame")
@@ -105,9 +105,9 @@ def _measure(scene: Scene, arguments: Arguments, topic: str) -> None:
         raise arguments.error(error.message, where) from None
 
 
-@command("HELP", syntax="HELP [<command>]", help="All commands, or one.", group="Flow")
+@command("HELP", syntax="HELP [<command>]", help="List all commands, or explain one.", group="Flow")
 def help_(scene: Scene, arguments: Arguments) -> None:
-    """All commands, or one (R88)."""
+    """List all commands, or explain one (R88)."""
     if not arguments:
         scene.say(show.command_listing(all_commands()))
         return

@@ -1,4 +1,4 @@
-"""Bending joints until skin touches an object, closing hands on it, and letting go (A §7, §9)."""
+"""Commands for flexion searches (AUTO_WRIST, AUTO_F_1, AUTO_F_2_3), GRASP and RELEASE (A §7, §9)."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _AUTO = "<key> [LEFT/RIGHT] {}<hand vertex or PAD> <object> <facet or NEAREST> [
 @command(
     "AUTO_WRIST",
     syntax=f"AUTO_WRIST {_AUTO.format('')}",
-    help="Wrist flexion that brings a vertex to an object: the nearest, either way, or out of it; WITHIN: how exactly.",
+    help="Find the wrist flexion at which a vertex touches an object, nearest to the present angle; WITHIN: tolerance.",
     group="Grasping",
 )
 def auto_wrist(scene: Scene, arguments: Arguments) -> None:
-    """Flexion of the wrist at a key with which a vertex of the hand touches an object (R86)."""
+    """Find the flexion of the wrist at a key with which a vertex of the hand touches an object (R86)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
     _search(scene, arguments, "AUTO_WRIST", key, side, "wrist", "middle")
@@ -38,11 +38,11 @@ def auto_wrist(scene: Scene, arguments: Arguments) -> None:
 @command(
     "AUTO_F_1",
     syntax=f"AUTO_F_1 {_AUTO.format('<THUMB/INDEX/MIDDLE/RING/PINKY> ')}",
-    help="Flexion at the base of a finger with which a vertex touches an object.",
+    help="Find the flexion at the base of a finger at which a vertex touches an object.",
     group="Grasping",
 )
 def auto_f_1(scene: Scene, arguments: Arguments) -> None:
-    """Flexion at the base of a finger with which a vertex touches an object (R87)."""
+    """Find the flexion at the base of a finger at which a vertex touches an object (R87)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
     finger = arguments.choice("the finger", DIGIT_WORDS).lower()
@@ -52,11 +52,11 @@ def auto_f_1(scene: Scene, arguments: Arguments) -> None:
 @command(
     "AUTO_F_2_3",
     syntax=f"AUTO_F_2_3 {_AUTO.format('<THUMB/INDEX/MIDDLE/RING/PINKY> <KNUCKLES2/KNUCKLES3> ')}",
-    help="Flexion of a finger's second or third joint with which a vertex touches an object.",
+    help="Find the flexion of a finger's second or third joint at which a vertex touches an object.",
     group="Grasping",
 )
 def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
-    """Flexion of a finger's second or third joint with which a vertex touches an object (R87)."""
+    """Find the flexion of a finger's second or third joint at which a vertex touches an object (R87)."""
     key = arguments.number("the key (a frame)")
     side = read_side(scene, arguments)
     finger, knuckle = arguments.choices(DIGIT_WORDS, ("KNUCKLES2", "KNUCKLES3"))
@@ -72,12 +72,12 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
         "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>], or GRASP <key1> <key2> BOTH <object> AUTO "
         "[TRIES <placements>]"
     ),
-    help="Digits close from key1 on and touch at key2; COUPLING bends joints together; AUTO finds a way to take it, "
-    "BOTH with two hands.",
+    help="Close digits on an object between key1 and key2; COUPLING flexes joints together; AUTO also finds where to "
+    "place the hand; BOTH uses two hands.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:
-    """Digits close from key1 on and touch at key2 (R90)."""
+    """Close digits on an object between key1 and key2 (R90)."""
     from warpjld.script.grasping import close_digits
 
     first, last = read_frames(arguments, "at which the digits begin to close", "at which they touch")
@@ -108,19 +108,24 @@ def grasp(scene: Scene, arguments: Arguments) -> None:
 
 
 def _check_size(actor: Actor, prop: Prop, arguments: Arguments) -> None:
-    """Refuse an object read in a unit that nobody stated, where its size is absurd beside the hand."""
+    """Refuse an object whose unit was assumed and whose size is implausible beside the hand.
+
+    Raises:
+        InputError: It is; names the units that would be plausible.
+    """
     from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 
     if prop.assumed is not None:
         doubt = doubt_of_size(prop.thing, hand_length(actor.skeleton), prop.assumed)
         if doubt is not None:
-            meant = f"; if it is meant so, say UNIT {prop.assumed.upper()}"
+            meant = f"; if that is its size, say UNIT {prop.assumed.upper()}"
             raise arguments.error(f"{prop.name} {doubt}{meant}")
 
 
 def _grasp_auto(  # type: ignore[no-untyped-def]
     scene: Scene, arguments: Arguments, side: str, prop, first: float, last: float
 ) -> None:
+    """GRASP … AUTO: read its options, search, and set the keys."""
     from warpjld.grasp.postures import POSTURES
     from warpjld.script.grasp_auto import grasp_by_itself
 
@@ -137,11 +142,12 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
 
 
 def _grasp_both(scene: Scene, arguments: Arguments, first: float, last: float) -> None:
+    """GRASP … BOTH … AUTO: read its arguments, search with both hands, and set the keys."""
     from warpjld.script.grasp_both import both_hands, grasp_by_both
 
     prop = read_object(scene, arguments)
     if not arguments.keyword("AUTO"):
-        raise arguments.expected("AUTO: two hands find their places themselves")
+        raise arguments.expected("AUTO: two hands are always placed by the search")
     options = arguments.options(
         tries=lambda: arguments.integer("the number of placements to try", minimum=1, maximum=100_000),
     )
@@ -158,7 +164,7 @@ def _grasp_both(scene: Scene, arguments: Arguments, first: float, last: float) -
 def _leave_keys(
     scene: Scene, actor: Actor, prop: Prop, side: str, first: float, last: float, digits: Sequence[str]
 ) -> None:
-    """Keys where a grasp would have them, all as the joints are: what follows it in the script can be checked."""
+    """Set keys at a grasp's frames to the present angles, without a search, so that later lines can be checked."""
     from warpjld.grasp.digits import digit_chains
     from warpjld.script.grasping import Attempt
 
@@ -177,24 +183,25 @@ def _leave_keys(
 @command(
     "RELEASE",
     syntax="RELEASE <key1> <key2> [LEFT/RIGHT]",
-    help="Digits closed by GRASP open again from key1 on; at key2 they are as before it.",
+    help="Open digits that GRASP closed: from key1 on, until at key2 they have their angles from before the grasp.",
     group="Grasping",
 )
 def release(scene: Scene, arguments: Arguments) -> None:
-    """Digits closed by GRASP open again from key1 on; at key2 they are as before it (R69)."""
+    """Open digits that GRASP closed, from key1 to key2, to their angles from before the grasp (R69)."""
     first, last = read_frames(arguments, "at which the digits begin to open", "at which they are open")
     actor = scene.actor_with(read_side(scene, arguments))
     if actor.name not in scene.grips:
         raise arguments.error(f"actor {actor.name} has grasped nothing", arguments.position)
     for channel, value in scene.grips.pop(actor.name).items():
         keys = actor.motion.tracks[channel].keys
-        # the last key's own value, to the bit: only then do splines hold it
+        # exactly the last key's value, so that the spline between the two is constant
         held = keys[-1].value if keys[-1].frame <= first else actor.value(channel, first)
         actor.set_keys(channel, [first], held, scene.spline)
         actor.set_keys(channel, [last], value, scene.spline)
 
 
 def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str, joint_name: str, finger: str) -> None:
+    """Read vertex, object, facet and options of a flexion search, run it, and set the key if it converged."""
     from warpjld.grasp import SearchStatus
     from warpjld.grasp.digits import pad_vertex
     from warpjld.grasp.search import FINEST

@@ -1,4 +1,4 @@
-"""Grips: digits close on what they have grasped, by an angle, to a force, or until they hold a weight (R123, R124)."""
+"""Commands that tighten a grip: by an angle, to a force (SQUEEZE), or until it holds a weight (LIFT) (R123, R124)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from warpjld.script.scene import Actor
 
 _MOST = 20.0
-"""Angle by which digits close on at most where nothing else is said [degrees]."""
+"""Default of the largest angle by which digits close further [degrees]; assumed."""
 
 
 @command(
@@ -28,11 +28,11 @@ _MOST = 20.0
         "SQUEEZE <key1> <key2> [LEFT/RIGHT] <degrees>, or SQUEEZE <key1> <key2> [LEFT/RIGHT] FORCE <newtons> "
         "[THUMB/INDEX/MIDDLE/RING/PINKY …] [MOST <degrees>]"
     ),
-    help="Closed digits bend on into the object: each joint by up to this much, or until they press with a FORCE.",
+    help="Flex closed digits further: each joint by up to this angle, or until they press with a FORCE.",
     group="Contact",
 )
 def squeeze(scene: Scene, arguments: Arguments) -> None:
-    """Closed digits bend on into the object: each joint by up to this much, or until they press with a FORCE (R112)."""
+    """Flex closed digits further into the object, by up to an angle or until they press with a force (R112)."""
     first, last = read_frames(arguments, "from which on the digits press", "at which they press most")
     actor = gripping_actor(scene, arguments)
     if not arguments.keyword("FORCE"):
@@ -59,11 +59,11 @@ def squeeze(scene: Scene, arguments: Arguments) -> None:
 @command(
     "LIFT",
     syntax="LIFT <key1> <key2> [LEFT/RIGHT] <object> [WEIGHT <newtons>] [MOST <degrees>]",
-    help="Closed digits take an object's weight, as gently as holds it, half-way to key2; then its support goes.",
+    help="Find the gentlest grip that holds an object's weight: it is reached half-way to key2; then the support goes.",
     group="Contact",
 )
 def lift(scene: Scene, arguments: Arguments) -> None:
-    """Closed digits take an object's weight, as gently as holds it, half-way to key2 (R123, R124)."""
+    """Find the gentlest grip that holds an object's weight; it is reached half-way to key2 (R123, R124)."""
     first, last = read_frames(arguments, "from which on the digits close", "at which they hold the object")
     if last - first < 4.0:
         raise arguments.error(f"LIFT wants 4 frames or more, got {last - first:g}")
@@ -89,11 +89,11 @@ def lift(scene: Scene, arguments: Arguments) -> None:
 @command(
     "STRENGTH",
     syntax="STRENGTH [LEFT/RIGHT] <THUMB/INDEX/MIDDLE/RING/PINKY> <newtons>",
-    help="How hard a digit can press at most; thumb 69, index and ring 59, middle 82, pinky 33 at first.",
+    help="Largest force of a digit [N]; by default thumb 69, index and ring 59, middle 82, pinky 33.",
     group="Contact",
 )
 def strength(scene: Scene, arguments: Arguments) -> None:
-    """How hard a digit can press at most; thumb 69, index and ring 59, middle 82, pinky 33 at first (R118)."""
+    """Largest force of a digit [N]; by default thumb 69, index and ring 59, middle 82, pinky 33 (R118)."""
     actor = read_actor(scene, arguments)
     digit = arguments.choice("the digit", DIGIT_WORDS).lower()
     newtons = arguments.number("the force in newtons", above=0.0)
@@ -101,12 +101,13 @@ def strength(scene: Scene, arguments: Arguments) -> None:
 
 
 def _most(arguments: Arguments) -> float:
+    """Read the option MOST: the largest angle by which digits close further [rad]."""
     options = arguments.options(most=lambda: arguments.number("the angle in degrees", above=0.0, maximum=90.0))
     return math.radians(float(cast(float, options.get("most", _MOST))))
 
 
 def _held_keys(scene: Scene, actor: Actor, arguments: Arguments, first: float, *later: float) -> tuple[str, ...]:
-    """Keys that hold the grip, until what is found takes their place; the channels they are of."""
+    """Set keys that hold the grip until the search's result replaces them; names of the channels."""
     if actor.recorded is not None:
         raise arguments.error(f"actor {actor.name} is driven by a MOTION file: no grip can be searched for")
     channels = []

@@ -1,4 +1,4 @@
-"""Keys as a whole: all that an actor or an object has at a frame, moved, copied, forgotten, or given other splines."""
+"""Command KEYS: move, copy or delete all keys of an actor or an object at a frame, or change their splines."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from warpjld.script.scene import Scene, SplineConstants
         "KEYS <MOVE/COPY> <key> <other key> [<actor or object>], KEYS DELETE <key> [<actor or object>] "
         "or KEYS SPLINE <key> <tension> <continuity> <bias> [<actor or object>]"
     ),
-    help="All keys of an actor (the current one) or an object at a frame: move, copy or forget them, or their splines.",
+    help="Move, copy or delete all keys of an actor (the current one) or object at a frame, or change their splines.",
     group="Animation",
 )
 def keys(scene: Scene, arguments: Arguments) -> None:
-    """All keys at a frame: moved, copied, forgotten, or with other spline constants (R3, R4)."""
+    """Move, copy or delete all keys at a frame, or change their spline constants (R3, R4)."""
     what = arguments.choice("what to do with the keys", ("MOVE", "COPY", "DELETE", "SPLINE"))
     frame = arguments.number("the key (a frame)")
     other = arguments.number("the other key (a frame)") if what in ("MOVE", "COPY") else frame
@@ -37,7 +37,7 @@ def keys(scene: Scene, arguments: Arguments) -> None:
 
 
 def _tracks(scene: Scene, name: str) -> list[dict[str, Track]]:
-    """The tracks of an actor's joints, if it is one, and those of it as a whole."""
+    """Tracks of the placement of an actor or object, after those of the joints if it is an actor."""
     placement = scene.placement(name)
     joints = [scene.actors[name.upper()].motion.tracks] if name.upper() in scene.actors else []
     return [*joints, placement.tracks]

@@ -1,4 +1,4 @@
-"""Loads on objects: forces on points, tractions and pressures on faces, turning (B eqs. 1–4, R97)."""
+"""Commands for loads on objects: forces, tractions, pressures, centrifugal forces, prestress (B eqs. 1–4, R97)."""
 
 from __future__ import annotations
 
@@ -20,44 +20,44 @@ _KEYS = "<key1> <key2> <step>"
 @command(
     "FORCE",
     syntax=f"FORCE <object> <points> {_KEYS} <x> <y> <z>",
-    help="Force on object points, shared by all of them, at key1, key1 + step, … up to key2 [N].",
+    help="Total force on a set of object points at key1, key1 + step, … up to key2 [N].",
     group="Contact",
 )
 def force(scene: Scene, arguments: Arguments) -> None:
-    """Force on object points, shared by all of them [N] (R97)."""
+    """Total force on a set of object points [N] (R97)."""
     _read(scene, arguments, "force", "xyz")
 
 
 @command(
     "TRACTION",
     syntax=f"TRACTION <object> <points> {_KEYS} <x> <y> <z>",
-    help="Force per area on the faces between object points, of a direction that stays [Pa].",
+    help="Traction on the faces between object points, in a constant direction [Pa].",
     group="Contact",
 )
 def traction(scene: Scene, arguments: Arguments) -> None:
-    """Force per area on the faces between object points, of a direction that stays [Pa] (R97)."""
+    """Traction on the faces between object points, in a constant direction [Pa] (R97)."""
     _read(scene, arguments, "traction", "xyz")
 
 
 @command(
     "PRESSURE",
     syntax=f"PRESSURE <object> <points> {_KEYS} <pascals>",
-    help="Pressure on the faces between object points, against them wherever they turn [Pa].",
+    help="Pressure on the faces between object points, along their deformed normals [Pa].",
     group="Contact",
 )
 def pressure(scene: Scene, arguments: Arguments) -> None:
-    """Pressure on the faces between object points, against them wherever they turn [Pa] (R97)."""
+    """Pressure on the faces between object points, along their deformed normals [Pa] (R97)."""
     _read(scene, arguments, "pressure", ("pressure",))
 
 
 @command(
     "SPIN",
     syntax=f"SPIN <object> <X/Y/Z> {_KEYS} <turns a second> [AT <x> <y> <z>]",
-    help="An object bears the centrifugal force of a steady turn about an axis of the stage through its middle, or AT.",
+    help="Centrifugal force of a steady rotation about a world axis through the object's centre, or through AT.",
     group="Contact",
 )
 def spin(scene: Scene, arguments: Arguments) -> None:
-    """An object bears the centrifugal force of a steady turn about an axis of the stage (R97)."""
+    """Centrifugal force of a steady rotation about a world axis (R97)."""
     prop = read_object(scene, arguments)
     _want_physical(scene, arguments, prop.name)
     if prop.name in scene.contact.spins:
@@ -78,11 +78,11 @@ def spin(scene: Scene, arguments: Arguments) -> None:
 @command(
     "PRESTRESS",
     syntax="PRESTRESS <object> <xx> <yy> <zz> [<xy> <yz> <zx>]",
-    help="Stress that an object has at rest, along its own axes [Pa]: tension above 0; what is not held relaxes it.",
+    help="Initial stress of an object in its own axes [Pa], tension positive; it relaxes where the object is not held.",
     group="Contact",
 )
 def prestress(scene: Scene, arguments: Arguments) -> None:
-    """Stress that an object has at rest, along its own axes [Pa] (R98)."""
+    """Initial stress of an object in its own axes [Pa] (R98)."""
     prop = read_object(scene, arguments)
     _want_physical(scene, arguments, prop.name)
     values = [arguments.number(f"the stress {name} in Pa") for name in ("xx", "yy", "zz")]
@@ -95,11 +95,11 @@ def prestress(scene: Scene, arguments: Arguments) -> None:
 def _read(
     scene: Scene, arguments: Arguments, kind: Literal["force", "traction", "pressure"], channels: str | tuple[str, ...]
 ) -> None:
-    """Read an object, its points, keys and a value for each channel."""
+    """Read an object, the name of its points, keys and a value for each channel; set the load's keys."""
     prop = read_object(scene, arguments)
     _want_physical(scene, arguments, prop.name)
     name = arguments.name("the name of points").upper()
-    known = [mine for one, mine in scene.contact.points if one == prop.name]
+    known = [points for owner, points in scene.contact.points if owner == prop.name]
     if name not in known:
         more = did_you_mean(name, known) or f"; name them with POINTS {prop.name} {name} …"
         raise arguments.error(f"{prop.name} has no points {name}{more}")

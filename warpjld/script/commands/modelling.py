@@ -1,4 +1,4 @@
-"""Objects that a script models itself: profiles turned or swept, soft objects (A3, A8, B3.1, R135, R137)."""
+"""Objects that a script models: surfaces of revolution, sweeps, soft objects (A3, A8, B3.1, R135, R137)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["modelled"]
 
 _MOST = 10_000
-"""Points of a profile, a path or a soft object at most."""
+"""Largest number of points of a profile, a path or a soft object."""
 
 
 def modelled(arguments: Arguments, shape: str, name: str) -> GraspObject:
-    """The object of ``REVOLVE``, ``SWEEP`` or ``SOFT``, whose numbers come next."""
+    """Read the numbers of a ``REVOLVE``, ``SWEEP`` or ``SOFT`` shape, and make the object."""
     from warpjld.grasp.modelled import revolved, soft, swept
 
     where = arguments.last
@@ -36,7 +36,7 @@ def modelled(arguments: Arguments, shape: str, name: str) -> GraspObject:
 
 
 def _rows(arguments: Arguments, whose: str, names: tuple[str, ...]) -> list[list[float]]:
-    """Points of as many numbers each as there are names, up to the next word."""
+    """Read points, one number for each name, up to the next word."""
     rows: list[list[float]] = []
     while not rows or arguments.has_number():
         rows.append([arguments.number(f"{whose} {name}", minimum=-LARGEST, maximum=LARGEST) for name in names])

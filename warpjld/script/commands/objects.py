@@ -1,4 +1,4 @@
-"""Objects: bringing them on, and letting them follow joints (A §7)."""
+"""Commands that add objects to the scene (OBJECT) and attach them to joints (OBJECTS) (A §7)."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ _MODELLED = ("REVOLVE", "SWEEP", "SOFT")
         "then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
         '[COLOR "<colour>"]'
     ),
-    help="Bring on an object: a shape, a file's surface (.npz: it deforms), a profile turned or swept, a soft one [m].",
+    help="Add an object [m]: a shape, a surface file (.npz: animated), a surface of revolution, a sweep, a soft one.",
     group="Grasping",
 )
 def object_(scene: Scene, arguments: Arguments) -> None:
-    """Bring on an object (A §7)."""
+    """Add an object to the scene (A §7)."""
     from scipy.spatial.transform import Rotation
 
     from warpjld.grasp.hand_scale import doubt_of_size, hand_length
@@ -103,11 +103,11 @@ def object_(scene: Scene, arguments: Arguments) -> None:
         "OBJECTS <object> <THUMB/INDEX/MIDDLE/RING/PINKY> <LEFT/RIGHT> <KNUCKLES2/KNUCKLES3> <start> <stop> "
         "or OBJECTS <object> JOINT <joint> <start> <stop>"
     ),
-    help="An object follows a joint from one frame to another; before and after it stays where it is.",
+    help="Attach an object to a joint from one frame to another; before and after it does not move.",
     group="Grasping",
 )
 def objects(scene: Scene, arguments: Arguments) -> None:
-    """An object follows a joint from one frame to another (R69–R72, R85, C14)."""
+    """Attach an object to a joint from one frame to another (R69–R72, R85, C14)."""
     from warpjld.grasp.attach import Association
 
     prop = read_object(scene, arguments)

@@ -1,4 +1,4 @@
-"""The camera, and files to make."""
+"""Commands for the camera and for the files to write: pictures, films, contact sheets, exports."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ _SHOWN = "[SHADED/WIREFRAME/PRESSURE [<actor or object> [THUMB/INDEX/MIDDLE/RING
         f"CAMERA <{'/'.join(VIEW_WORDS)}> [ZOOM <factor>] [FOLLOW] or CAMERA FROM <x> <y> <z> TO <x> <y> <z> "
         "[ROLL <degrees>] [AT <frame>] …"
     ),
-    help="Where pictures and films after this line are taken from [m]; FOLLOW: the first actor; AT sets keys of a way.",
+    help="Camera of the pictures and films after this line [m]; FOLLOW: it moves with the first actor; AT sets keys.",
     group="Output",
 )
 def camera(scene: Scene, arguments: Arguments) -> None:
-    """Where the pictures and films after this line are taken from [m]; FOLLOW goes along with the first actor (R5)."""
+    """Camera of the pictures and films after this line [m]; FOLLOW moves it with the first actor (R5)."""
     view, position, target = None, None, None
     if arguments.keyword("FROM"):
         position = arguments.vector("the camera's")
@@ -69,20 +69,20 @@ def camera(scene: Scene, arguments: Arguments) -> None:
 
 
 def _with_key(scene: Scene, key: CameraKey) -> tuple[CameraKey, ...]:
-    """The keys of the camera's way and another; a shot ends a way."""
+    """The camera's keys with one more; after a SHOT has used the camera, a new sequence of keys begins."""
     taken = any(shot.camera is scene.camera for shot in scene.shots.values())
-    others = () if taken else tuple(one for one in scene.camera.keys if one.frame != key.frame)
-    return tuple(sorted((*others, key), key=lambda one: one.frame))
+    others = () if taken else tuple(other for other in scene.camera.keys if other.frame != key.frame)
+    return tuple(sorted((*others, key), key=lambda each: each.frame))
 
 
 @command(
     "SIZE",
     syntax="SIZE <width> <height>",
-    help="Pixels of the pictures and films; 960 by 720 at first.",
+    help="Size of pictures and films in pixels; 960 by 720 by default.",
     group="Output",
 )
 def size(scene: Scene, arguments: Arguments) -> None:
-    """Pixels of the pictures and films; 960 by 720 at first (R67)."""
+    """Size of pictures and films in pixels; 960 by 720 by default (R67)."""
     width = arguments.integer("the width in pixels", minimum=16, maximum=4096)
     scene.size = width, arguments.integer("the height in pixels", minimum=16, maximum=4096)
 
@@ -90,11 +90,11 @@ def size(scene: Scene, arguments: Arguments) -> None:
 @command(
     "PICTURE",
     syntax=f'PICTURE <frame> "<name>.png" {_SHOWN[:-1]}/NUMBERS [<actor or object>]]',
-    help="A picture of a frame; PRESSURE colours what touches; NUMBERS are the files' own, of vertices and facets.",
+    help="A picture of a frame; PRESSURE colours contact pressure; NUMBERS shows the files' vertex and facet numbers.",
     group="Output",
 )
 def picture(scene: Scene, arguments: Arguments) -> None:
-    """A picture of a frame; PRESSURE colours what touches: all, or one actor, digit or object alone (R5, R66, R67)."""
+    """A picture of a frame; PRESSURE colours all, or one actor, digit or object (R5, R66, R67)."""
     frame = arguments.number("the frame")
     name = arguments.output_name("the picture's name", PICTURES)
     if arguments.keyword("NUMBERS"):
@@ -108,7 +108,7 @@ def picture(scene: Scene, arguments: Arguments) -> None:
 @command(
     "FILM",
     syntax=f'FILM "<name>{"/".join(FILMS)}" [SHOTS <shot> …] {_SHOWN}',
-    help="A film of all frames, or of shots in their order.",
+    help="A film of all frames, or of shots in the order given.",
     group="Output",
 )
 def film(scene: Scene, arguments: Arguments) -> None:
@@ -121,7 +121,7 @@ def film(scene: Scene, arguments: Arguments) -> None:
 
 
 def _shots(scene: Scene, arguments: Arguments) -> tuple[Shot, ...]:
-    """Shots of a film: one after another, since frames are made in their order."""
+    """Read the shots of a film; their frames must increase, since frames are computed in order."""
     out: list[Shot] = []
     while (name := arguments.keyword(*scene.shots)) is not None:
         shot = scene.shots[name]
@@ -140,11 +140,11 @@ def _shots(scene: Scene, arguments: Arguments) -> tuple[Shot, ...]:
 @command(
     "CONTACT",
     syntax='CONTACT "<name>.png" [<frame> …]',
-    help="A contact sheet: frames side by side, as wire-frame and shaded; key frames unless listed.",
+    help="A contact sheet: frames side by side, as wire-frame and shaded; the key frames if none are listed.",
     group="Output",
 )
 def contact(scene: Scene, arguments: Arguments) -> None:
-    """A contact sheet: frames side by side, as wire-frame and shaded; key frames unless listed (R67)."""
+    """A contact sheet: frames side by side, as wire-frame and shaded; the key frames if none are listed (R67)."""
     name = arguments.output_name("the sheet's name", PICTURES)
     frames = []
     while arguments:
@@ -155,11 +155,11 @@ def contact(scene: Scene, arguments: Arguments) -> None:
 @command(
     "EXPORT",
     syntax=f'EXPORT "<name>{"/".join(EXPORTS)}" [<actor>]',
-    help="The animated surface of an actor; of all, each in a file of its own, if none is named.",
+    help="The animated surface of an actor; if none is named, of all actors, one file each.",
     group="Output",
 )
 def export(scene: Scene, arguments: Arguments) -> None:
-    """The animated surface of an actor; of all, each in a file of its own, if none is named (R89)."""
+    """The animated surface of an actor; if none is named, of all actors, one file each (R89)."""
     name = arguments.output_name("the file's name", EXPORTS)
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
     ask_for(scene, arguments, Export(name, actor))
@@ -168,11 +168,11 @@ def export(scene: Scene, arguments: Arguments) -> None:
 @command(
     "EXPORT_MOTION",
     syntax=f'EXPORT_MOTION "<name>{"/".join(MOTIONS)}" [<actor>]',
-    help="The motion of an actor on its rig's own joints; of all, each in a file of its own, if none is named.",
+    help="The motion of an actor on its rig's own joints; if none is named, of all actors, one file each.",
     group="Output",
 )
 def export_motion(scene: Scene, arguments: Arguments) -> None:
-    """The motion of an actor on its rig's own joints; of all, each in a file of its own, if none is named (R89)."""
+    """The motion of an actor on its rig's own joints; if none is named, of all actors, one file each (R89)."""
     name = arguments.output_name("the file's name", MOTIONS)
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
     ask_for(scene, arguments, MotionFile(name, actor))
@@ -183,7 +183,7 @@ def _style(arguments: Arguments, *beside: str) -> PictureStyle:
 
 
 def _only(scene: Scene, arguments: Arguments, style: PictureStyle) -> tuple[str | None, tuple[str, ...]]:
-    """What is shown alone, and which digits of it."""
+    """Read which actor or object is coloured alone, and which of its digits; None and () for all."""
     if style != "pressure" or not arguments:
         return None, ()
     name = _shown_alone(scene, arguments)
@@ -204,7 +204,11 @@ def _shown_alone(scene: Scene, arguments: Arguments) -> str:
 
 
 def ask_for(scene: Scene, arguments: Arguments, output: Output) -> None:
-    """Note a file to make."""
+    """Add a file to the scene's outputs.
+
+    Raises:
+        InputError: There is an output of that name already.
+    """
     if any(other.name.lower() == output.name.lower() for other in scene.outputs):
         raise arguments.error(f"'{output.name}' is asked for twice")
     scene.outputs.append(output)

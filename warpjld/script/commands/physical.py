@@ -1,4 +1,4 @@
-"""Bodies that deform: objects, flesh, what holds between them and what pulls at them (B §3, R92, R101, R109)."""
+"""Commands that make objects and flesh deformable, and set friction, bonds and gravity (B §3, R92, R101, R109)."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ _LAWS = tuple(law.upper() for law in LAWS)
         f"PHYSICAL <object> [OF <material>] [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] [POISSON <ratio>] "
         "[DENSITY <kg/m³>] [HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
     ),
-    help="An object deforms: OF what it is made, or law and moduli; a wall makes it hollow; its elements' size.",
+    help="Make an object deformable: OF a material, or by law and moduli; HOLLOW with a wall; ELEMENT: mesh size.",
     group="Contact",
 )
 def physical(scene: Scene, arguments: Arguments) -> None:
-    """An object deforms (R92, R109, R111)."""
+    """Make an object deformable (R92, R109, R111)."""
     prop = read_object(scene, arguments)
     where = arguments.last
     if prop.deforms:
@@ -80,11 +80,11 @@ def physical(scene: Scene, arguments: Arguments) -> None:
         "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
         "[POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>]"
     ),
-    help="An actor's flesh deforms, of some digits or the palm only if named; ITSELF: whether skin touches skin.",
+    help="Make an actor's flesh deformable, all of it or the digits and palm named; ITSELF: contact of skin with skin.",
     group="Contact",
 )
 def flesh(scene: Scene, arguments: Arguments) -> None:
-    """An actor's flesh deforms, of some digits or the palm only if named (R91, R105, R126)."""
+    """Make an actor's flesh deformable, all of it or the digits and palm named (R91, R105, R126)."""
     name = arguments.name("an actor's name")
     try:
         actor = scene.actor(name)
@@ -112,26 +112,26 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
 @command(
     "FRICTION",
     syntax="FRICTION <actor or object> <actor or object> <coefficient> or FRICTION <coefficient>",
-    help="Coulomb's coefficient between two, or between all others; 0.6 at first.",
+    help="Coulomb coefficient of friction between two bodies, or the default for all pairs; 0.6 unless set.",
     group="Contact",
 )
 def friction(scene: Scene, arguments: Arguments) -> None:
-    """Coulomb's coefficient between two, or between all others; 0.6 at first (R122)."""
+    """Coulomb coefficient of friction between two bodies, or the default for all pairs; 0.6 unless set (R122)."""
     if arguments.has_number():
         scene.contact.everywhere = _coefficient(arguments)
         return
-    one, other = _body(scene, arguments), _body(scene, arguments)
-    scene.contact.friction[name_pair(one, other)] = _coefficient(arguments)
+    first, second = _body(scene, arguments), _body(scene, arguments)
+    scene.contact.friction[name_pair(first, second)] = _coefficient(arguments)
 
 
 @command(
     "BOND",
     syntax="BOND <object> <object> <tension in pascals> [<shear in pascals>]",
-    help="Two physical objects that touch are one, until tension or shear between them is more than this.",
+    help="Bond two physical objects where they touch; the bond breaks where tension or shear exceeds these.",
     group="Contact",
 )
 def bond(scene: Scene, arguments: Arguments) -> None:
-    """Two physical objects that touch are one, until tension or shear between them is more than this (R101, R102)."""
+    """Bond two physical objects where they touch, until tension or shear exceeds a limit (R101, R102)."""
     names = []
     for _ in range(2):
         prop = read_object(scene, arguments)
@@ -148,16 +148,16 @@ def bond(scene: Scene, arguments: Arguments) -> None:
 @command(
     "GRAVITY",
     syntax="GRAVITY <x> <y> <z>",
-    help="Acceleration that pulls at physical objects and flesh [m/s²]; 0 0 0 at first.",
+    help="Acceleration of gravity on physical objects and flesh [m/s²]; 0 0 0 by default.",
     group="Contact",
 )
 def gravity(scene: Scene, arguments: Arguments) -> None:
-    """Acceleration that pulls at physical objects and flesh [m/s²]; 0 0 0 at first (R97)."""
+    """Acceleration of gravity on physical objects and flesh [m/s²]; 0 0 0 by default (R97)."""
     scene.contact.gravity = arguments.vector("the acceleration's")
 
 
 def read_object(scene: Scene, arguments: Arguments) -> Prop:
-    """Read an object's name."""
+    """Read the name of an object; the object."""
     name = arguments.name("an object's name")
     try:
         return scene.prop(name)
@@ -166,7 +166,7 @@ def read_object(scene: Scene, arguments: Arguments) -> Prop:
 
 
 def place(arguments: Arguments) -> SourceLocation:
-    """Where the command stands."""
+    """Position of the command in the script: path, line, column."""
     return arguments.position.path, arguments.position.line, arguments.position.column
 
 

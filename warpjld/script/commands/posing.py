@@ -1,4 +1,4 @@
-"""Whole poses of a hand at a key."""
+"""Command POSE: a whole hand pose at a key, from the library or a file."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from warpjld.script.scene import Scene
     "POSE",
     syntax=f"POSE <LEFT/RIGHT> <{'/'.join(SHIPPED).upper()}> <key> [SHARE <percent>] or "
     'POSE <LEFT/RIGHT> "<pose file>" <key> [SHARE <percent>]',
-    help="A whole pose of the digits at a key, from the library or a file; SHARE: only a part of the way to it.",
+    help="Set all digits to a pose at a key, from the library or a file; SHARE: blend with the present pose.",
     group="Animation",
 )
 def pose(scene: Scene, arguments: Arguments) -> None:
-    """A whole pose of the digits at a key, or a part of the way from where they are to it."""
+    """Set all digits to a pose at a key, or blend the present pose with it."""
     side = arguments.choice("the side", SIDES).lower()
     if arguments.has_text():
         wanted = load_pose(arguments.input_file("a pose file"))

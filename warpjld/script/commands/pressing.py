@@ -1,4 +1,4 @@
-"""Solving contact over frames, and what to write of it (B §3.3, R110–R125)."""
+"""Command PRESS, which solves contact, and the outputs that report on it (B §3.3, R110–R125)."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from warpjld.simulation.specification import SolveSpecification
         '[BEARS <pascals>] [STATE "<file>.npz"]'
     ),
     help=(
-        "Solve contact: digits close until muscles or skin (BEARS) can do no more; RIGID: regardless; STOP there; "
-        "CORRECT: open."
+        "Solve contact. A digit at its force limit (STRENGTH, BEARS) stops closing; RIGID: ignore limits; "
+        "STOP: end there; CORRECT: open it."
     ),
     group="Contact",
 )
@@ -45,7 +45,7 @@ def press(scene: Scene, arguments: Arguments) -> None:
     if options.get("aitken") and options.get("method") != "paper":
         raise arguments.error("AITKEN relaxes the paper's loop: it goes with METHOD PAPER")
     if sum(bool(options.get(name)) for name in ("stop", "correct", "rigid")) > 1:
-        raise arguments.error("STOP, CORRECT or RIGID, not two of them: each says what to do where muscles can no more")
+        raise arguments.error("STOP, CORRECT or RIGID, not two of them: each says what to do at the force limit")
     if not (scene.contact.flesh or scene.contact.physical):
         raise arguments.error("nothing deforms: make a body do so with FLESH or PHYSICAL first", arguments.position)
     before = scene.contact.pressing
@@ -60,7 +60,7 @@ def press(scene: Scene, arguments: Arguments) -> None:
 @command(
     "TABLE",
     syntax=f'TABLE "<name>{"/".join(TABLES)}"',
-    help="A table by frame and digit: contact force, area, peak pressure, reaction of the bones, share of the muscles' "
+    help="A table by frame and digit: contact force, area, peak pressure, reaction of the bones, fraction of the force "
     "limit, sliding.",
     group="Output",
 )
@@ -72,11 +72,11 @@ def table(scene: Scene, arguments: Arguments) -> None:
 @command(
     "TACTILE",
     syntax=f'TACTILE "<name>{"/".join((*TABLES, *PICTURES))}" [<actor>]',
-    help="What an actor's skin feels over time, pad by pad: force, centre, area, slip; as a table or as a plot.",
+    help="Tactile signals of an actor's pads over time: force, centre, area, slip; as a table or as a plot.",
     group="Output",
 )
 def tactile(scene: Scene, arguments: Arguments) -> None:
-    """What an actor's skin feels over time, pad by pad (R95, R125)."""
+    """Tactile signals of an actor's pads over time (R95, R125)."""
     name = arguments.output_name("the name of the table or the plot", (*TABLES, *PICTURES))
     actor = scene.actor(arguments.name("an actor's name")).name if arguments else None
     ask_for(scene, arguments, TactileOutput(name, actor))

@@ -1,4 +1,4 @@
-"""REACH: the arm alone brings the hand to a place (A §7, R90)."""
+"""Command REACH: inverse kinematics of an arm, to an object or a point (A §7, R90)."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _PARTS = ("PALM", "WRIST", *DIGIT_WORDS)
 @command(
     "REACH",
     syntax="REACH <key1> <key2> [LEFT/RIGHT] <object>, or AT <x> <y> <z>, then [WITH <PALM/WRIST/THUMB/INDEX/…>]",
-    help="An arm brings palm, wrist or a digit's pad to the near side of an object or to a point; the body stays.",
+    help="Move an arm so that palm, wrist or a digit's pad reaches the near side of an object, or a point.",
     group="Grasping",
 )
 def reach(scene: Scene, arguments: Arguments) -> None:
-    """An arm brings palm, wrist or a digit's pad to the near side of an object or to a point; the body stays (R90)."""
+    """Move an arm so that palm, wrist or a digit's pad reaches the near side of an object, or a point (R90)."""
     from warpjld.script.reaching import Goal, nearest_side, reach_for
 
     first, last = read_frames(arguments, "at which the arm begins to move", "at which the hand is there")

@@ -1,1 +1,1 @@
-"""The studio's panels: what the state is shown and changed with. Each refreshes itself from the state."""
+"""Panels of the studio: views that show and edit the state; each refreshes itself from it."""

@@ -1,4 +1,4 @@
-"""The curve of a channel over time, and what is done with keys."""
+"""Panel with the curve of a channel over time, and editing of keys."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NOTHING = "—"
 
 
 class CurvesPanel:
-    """A graph, and buttons that move and copy the keys at the frame, or change their splines."""
+    """Graph of a channel, with buttons to move and copy the keys at the current frame and to change their splines."""
 
     def __init__(self, room: Room) -> None:
         from viser import uplot

@@ -1,4 +1,4 @@
-"""Fingertips dragged on the stage: the rest of the hand follows inside its limits."""
+"""Panel for dragging fingertips in the 3D view; inverse kinematics moves the hand within its limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NOTHING = "nothing"
 
 
 class DragPanel:
-    """A handle on a fingertip. With the wrist free, the other tips are pinned where they are."""
+    """A handle on a fingertip. If the wrist may move, the other fingertips are held in place."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -33,7 +33,7 @@ class DragPanel:
         self.what.on_update(lambda event: room.by_hand(event, lambda: None))
 
     def refresh(self) -> None:
-        """Put the handle where the tip is."""
+        """Move the handle to the fingertip."""
         wanted = self._wanted()
         if self._handle is not None and self._on != wanted:
             self._handle.remove()
@@ -52,7 +52,7 @@ class DragPanel:
             self._handle.position = tuple(place)
 
     def _wanted(self) -> tuple[str, str, str] | None:
-        """Actor, side and digit of the handle."""
+        """Actor, side and digit of the handle; None without one."""
         actor, digit = self._room.state.actor, self.what.value
         if actor is None or digit == _NOTHING or actor.recorded is not None:
             return None
@@ -60,7 +60,7 @@ class DragPanel:
         return None if side is None else (actor.name, side, digit)
 
     def _places(self) -> dict[str, np.ndarray]:
-        """Where the tips are [m], shape (3,) each."""
+        """World positions of the fingertips by digit [m], shape (3,) each."""
         state = self._room.state
         assert state.actor is not None
         assert self._on is not None

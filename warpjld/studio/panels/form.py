@@ -1,4 +1,4 @@
-"""A command's form in a window of its own: its fields, the line that they come to, and the button that does it."""
+"""Form window of a command: fields for its arguments, the resulting line, and a button that runs it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _NONE = "—"
 
 
 class FormWindow:
-    """The form, in the browser's window that asked for it.
+    """Form of a command or macro in one browser window.
 
     Args:
         room: The studio.
-        client: That window.
+        client: The browser window.
         name: The command or macro.
-        about: What it does.
+        about: Its help text.
         ways: The ways to call it.
     """
 

@@ -1,4 +1,4 @@
-"""Menus: an entry for every command, ours and users', and for the script's macros; each opens a form."""
+"""Menus with an entry for every command (built-in and users') and every macro of the script; each opens a form."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["MenusPanel"]
 
 
 class MenusPanel:
-    """The menus, and the command palette (Ctrl+K) with all their entries."""
+    """The menus, and the command palette (Ctrl+K) with the same entries."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -36,7 +36,7 @@ class MenusPanel:
                         self._add(name, entry, command)
 
     def refresh(self) -> None:
-        """Show the macros that the script defines."""
+        """Update the entries of the script's macros."""
         macros = self._room.state.performance.macros
         if tuple(macros) == self._macros:
             return

@@ -1,4 +1,4 @@
-"""What is wrong, and what commands say."""
+"""Panel with the current error and the last messages."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 __all__ = ["MessagesPanel"]
 
-_LAST = 3
+_LAST = 3  # messages shown
 
 
 class MessagesPanel:
-    """The error, if there is one, and the last messages."""
+    """The current error, if there is one, and the last messages."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -22,7 +22,7 @@ class MessagesPanel:
         self._html = room.server.gui.add_html("")
 
     def refresh(self) -> None:
-        """Show them."""
+        """Update error and messages."""
         state = self._room.state
         parts = []
         if state.error is not None:

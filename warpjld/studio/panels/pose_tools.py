@@ -1,4 +1,4 @@
-"""Whole hands posed: coarse sliders, the library, copy and paste, neighbours in time."""
+"""Panel for whole hand poses: coarse sliders, pose library, copy and paste, blending with neighbouring keys."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 __all__ = ["PoseToolsPanel"]
 
-_FOLDER = "poses"
-_PUSH = 0.25
+_FOLDER = "poses"  # beside the script
+_PUSH = 0.25  # amount by which a button blends towards another pose
 
 
 class PoseToolsPanel:
-    """What poses a hand as a whole."""
+    """Tools that pose a hand as a whole."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -44,7 +44,7 @@ class PoseToolsPanel:
         self.side.on_update(lambda event: room.by_hand(event, lambda: None))
 
     def refresh(self) -> None:
-        """Show the shares of the pose, and the poses that there are."""
+        """Update the coarse sliders and the list of poses."""
         state, waits = self._room.state, self._room.worker.waits
         sides = [side for side in ("left", "right") if any(name.startswith(f"{side}.") for name in state.channels())]
         if sides and self.side.value not in sides:

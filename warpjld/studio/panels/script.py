@@ -1,4 +1,4 @@
-"""The script: what is done by mouse appears here, what is typed here is done."""
+"""Panel with the script's text, which can be edited, and which shows edits made elsewhere in the studio."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["ScriptPanel"]
 
 
 class ScriptPanel:
-    """The text, a line to add a command with, undo and redo."""
+    """The text, an input line for commands, undo and redo."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -27,7 +27,7 @@ class ScriptPanel:
         form.on_submit(lambda _: room.post(self._add))
 
     def refresh(self) -> None:
-        """Show the text where it is not what is in the pane."""
+        """Update the text if it has changed."""
         if not self._room.worker.waits("text"):
             self.text.value = self._room.state.document.text
 

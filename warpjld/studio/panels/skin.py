@@ -1,4 +1,4 @@
-"""The covering's parameters by slider, seen as they change."""
+"""Panel with sliders for the covering's parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ALL = "ALL"
 
 
 class SkinPanel:
-    """Parameters of a joint, or of all."""
+    """Sliders for the parameters of one joint, or of all joints."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -27,7 +27,7 @@ class SkinPanel:
         self.joint.on_update(lambda event: room.by_hand(event, lambda: None))
 
     def refresh(self) -> None:
-        """Show the values of the joint; of all joints those of the first that bends."""
+        """Update the values: those of the joint, or for all joints those of the first joint that flexes."""
         actor = self._room.state.actor
         if actor is None:
             return

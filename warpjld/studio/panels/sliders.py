@@ -1,4 +1,4 @@
-"""A slider for every channel that may move, by digit; dragging one sets a key at the frame that is shown."""
+"""Panel with a slider for every movable channel, grouped by digit; dragging one sets a key at the current frame."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 __all__ = ["SlidersPanel"]
 
-_STEP = 0.5  # degrees
+_STEP = 0.5  # step of the sliders [degrees]
 
 
 class SlidersPanel:
-    """The sliders of the actor."""
+    """Sliders of the selected actor."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -24,7 +24,7 @@ class SlidersPanel:
         self._of: object = None
 
     def refresh(self) -> None:
-        """Show the angles at the frame."""
+        """Update the sliders to the angles at the current frame."""
         state = self._room.state
         channels = state.channels()
         if self._of != (made := tuple(channels.items())):
@@ -69,6 +69,6 @@ class SlidersPanel:
 
 
 def _part(channel: str) -> str:
-    """The digit or the limb that a channel belongs to."""
+    """Digit or limb that a channel belongs to."""
     names = channel.split(".")
     return " ".join(names[:2]) if len(names) > 3 else names[0] if names[0] in ("left", "right") else "body"

@@ -1,4 +1,4 @@
-"""The stage: actors and objects as they are at the frame that is shown."""
+"""3D view of the actors and objects at the current frame."""
 
 from __future__ import annotations
 

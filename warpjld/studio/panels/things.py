@@ -1,4 +1,4 @@
-"""Objects: brought on, moved with a handle, grasped."""
+"""Panel for objects: add, move with a handle, grasp."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ __all__ = ["ThingsPanel"]
 
 _NOTHING = "—"
 _SIZES = {"ball": "0.065", "box": "0.05 0.05 0.05", "cylinder": "0.05 0.1", "plate": "", "glass": ""}
-"""Of objects that are brought on here: what a hand takes."""
-_TENTH = 4  # digits of places [m]
+"""Sizes [m] of the objects that this panel adds, suitable for a hand."""
+_TENTH = 4  # decimals of positions [m]: a tenth of a millimetre
 
 
 class ThingsPanel:

@@ -1,4 +1,4 @@
-"""Time: a slider over the frames, play and loop, keys to step between."""
+"""Timeline: a slider over the frames, playback, stepping between keys."""
 
 from __future__ import annotations
 

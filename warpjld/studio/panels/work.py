@@ -1,4 +1,4 @@
-"""Files and work: open, save, run the script, solve its contact; and what came of it."""
+"""Panel for files and jobs: open, save, run the script, solve its contact; shows the results."""
 
 from __future__ import annotations
 

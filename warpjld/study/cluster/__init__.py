@@ -1,4 +1,4 @@
-"""Studies on many machines by Ray: trials travel, inputs with them by hash, and results come back to be written."""
+"""Studies on a Ray cluster: machines receive trials and input files, and return results, which the driver writes."""
 
 from warpjld.study.cluster.run import run_on_ray
 

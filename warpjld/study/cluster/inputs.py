@@ -1,4 +1,4 @@
-"""Input files for other machines: read once, known by their hash, held in Ray's store."""
+"""Input files for other machines, placed in Ray's object store and identified by their SHA-256."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["sent_inputs"]
 
 
 def sent_inputs(paths: Iterable[Path], put: Any) -> tuple[Sent, ...]:
-    """Files, with those that belong to them (the buffers of a .gltf, the layers of a USD stage), put into the store.
+    """Put files, and those they refer to (buffers of a .gltf, layers of a USD stage), into the object store.
 
     Args:
         paths: The files.

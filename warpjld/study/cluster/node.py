@@ -1,4 +1,4 @@
-"""What runs on the machines of a cluster: nothing of it writes, but the inputs that it was sent."""
+"""Code that runs on the machines of a cluster; it writes no files except copies of the inputs it was sent."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from warpjld.study.pool import performed
 __all__ = ["MATCHING", "Sent", "ping", "sources", "trial_bytes"]
 
 MATCHING = ("warpjld", "sources", "warp-lang", "numpy", "scipy")
-"""Versions that all machines must share: another one may give other last bits."""
+"""Packages whose versions must be the same on all machines, since another version may give other last bits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sent:
-    """One input file and those that belong to it, in Ray's store.
+    """An input file and the files it refers to, in Ray's object store.
 
     Attributes:
-        path: Where it lies on the machine of the study.
-        name: Of the file itself, below the folder that all lie in.
+        path: Its path on the driver's machine.
+        name: Its name relative to the common folder of all these files.
         digest: SHA-256 of names and contents.
-        files: Name of each file below that folder, its SHA-256, and the reference of its bytes.
+        files: For each file its name relative to that folder, its SHA-256, and the reference of its bytes.
     """
 
     path: str
@@ -40,7 +40,7 @@ class Sent:
 
 
 def ping() -> dict[str, Any]:
-    """What this machine is, and the versions of what computes."""
+    """Host name, processor, Python and package versions of this machine."""
     found: dict[str, Any] = {name: versions([name])[name] for name in MATCHING if name != "sources"}
     about = {"host": platform.node(), "cpu": _cpu_model(), "python": platform.python_version()}
     return about | {"versions": found | {"sources": sources()}}
@@ -48,7 +48,7 @@ def ping() -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def sources() -> str:
-    """SHA-256 of the program: a version under way changes without its number."""
+    """SHA-256 of the program's source files: during development they change without the version number."""
     import warpjld_kernels
 
     import warpjld
@@ -61,30 +61,30 @@ def sources() -> str:
     return digest.hexdigest()[:16]
 
 
-_ready: dict[str, Experiment] = {}  # by the driver's key: begun once in a process
+_ready: dict[str, Experiment] = {}  # experiment by the driver's key, loaded once per process
 
 
 def trial_bytes(key: str, held: list[Any], sent: tuple[Sent, ...], trial: int) -> bytes:
-    """One trial, packed as it is kept on disk.
+    """Run one trial; its packed shard.
 
     Args:
-        key: Of the experiment.
-        held: Reference of the experiment in Ray's store, in a list so that it is fetched once in a process only.
-        sent: Its inputs.
-        trial: Which one.
+        key: Key of the experiment.
+        held: Reference of the experiment in the object store, in a list so that Ray does not resolve it for every call.
+        sent: Its input files.
+        trial: Number of the trial.
     """
     import ray
 
     if key not in _ready:
         experiment: Experiment = ray.get(held[0])
         _ready.clear()
-        _ready[key] = experiment.moved({Path(one.path): _placed(one) for one in sent})
+        _ready[key] = experiment.moved({Path(file.path): _placed(file) for file in sent})
         _ready[key].begin()
     return performed(_ready[key], trial).packed()
 
 
-def _placed(one: Sent) -> Path:
-    """Where an input lies on this machine; it is fetched unless it is there already, by its hash."""
+def _placed(source: Sent) -> Path:
+    """Path of an input on this machine; fetched unless a file with the same hash is there already."""
     import ray
 
     from warpjld.files.whole_file import whole_file
@@ -94,19 +94,19 @@ def _placed(one: Sent) -> Path:
     own.mkdir(exist_ok=True, mode=0o700)
     if hasattr(os, "getuid") and own.stat().st_uid != os.getuid():
         raise WarpjldError(f"{own} on {platform.node()} belongs to somebody else: remove it")
-    folder = own / one.digest
+    folder = own / source.digest
     folder.mkdir(exist_ok=True)
-    for name, digest, held in one.files:
+    for name, digest, held in source.files:
         path = folder / name
         if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == digest:
             continue
         content = ray.get(held)
         if hashlib.sha256(content).hexdigest() != digest:
-            raise WarpjldError(f"{name}: came to {platform.node()} with other bytes than were sent")
+            raise WarpjldError(f"{name}: the copy that arrived on {platform.node()} is damaged")
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part:
             part.write_bytes(content)
-    return folder / one.name
+    return folder / source.name
 
 
 def _cpu_model() -> str:

@@ -1,4 +1,4 @@
-"""The machines of a cluster: which there are, whether they compute the same, and trials handed to them."""
+"""Machines of a Ray cluster: discovery, version comparison, submission of trials, loss of workers and machines."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from warpjld.study.cluster.node import MATCHING, Sent, ping, trial_bytes
 
 __all__ = ["ClusterNode", "LostNodeError", "LostWorkerError", "Nodes", "differing"]
 
-_ANSWER = 120.0  # seconds that a machine has to start a worker and answer
-_STILL_THERE = 15.0  # likewise, where one has just lost a worker
-_MISSED = 60.0  # seconds within which Ray misses a machine that is gone
+_ANSWER = 120.0  # time for a machine to start a worker and answer [s]
+_STILL_THERE = 15.0  # the same after it has lost a worker [s]
+_MISSED = 60.0  # time within which Ray notices that a machine is gone [s]
 
 
 class LostWorkerError(Exception):
-    """A trial ended its worker."""
+    """A worker process died while it ran a trial."""
 
 
 class LostNodeError(Exception):
-    """The machine went away, which is no fault of the trial."""
+    """A machine left the cluster while it ran a trial."""
 
 
 @dataclass
 class ClusterNode:
-    """One machine.
+    """One machine of the cluster.
 
     Attributes:
-        key: Ray's name of it.
-        host: Its own name.
-        cpus: Trials it takes at once.
+        key: Ray's node id.
+        host: Host name.
+        cpus: Number of trials it runs at once.
         cpu: Model of its processor.
-        versions: Of what computes there.
+        versions: Versions of the packages in ``MATCHING``.
         used: Whether it is given trials.
-        why: Why not.
-        trials: How many it has done.
-        busy: How many it has been handed and not given back.
+        why: Why it is not, or what was noted about it.
+        trials: Number of trials it has done.
+        busy: Number of trials submitted and not yet returned.
     """
 
     key: str
@@ -55,7 +55,7 @@ class ClusterNode:
         return f"{self.host} ({self.key[:8]}{', ' + self.cpu if self.cpu else ''})"
 
     def about(self) -> dict[str, Any]:
-        """For the manifest."""
+        """Its description in the manifest."""
         return {name: value for name, value in asdict(self).items() if name != "busy"}
 
 
@@ -63,9 +63,9 @@ class Nodes:
     """Machines of the cluster that Ray is connected to.
 
     Args:
-        key: Of the experiment.
-        held: Reference of the experiment.
-        sent: Its inputs.
+        key: Key of the experiment.
+        held: Reference of the experiment in the object store.
+        sent: Its input files.
     """
 
     def __init__(self, key: str, held: Any, sent: tuple[Sent, ...]) -> None:
@@ -78,40 +78,40 @@ class Nodes:
         self.all: dict[str, ClusterNode] = {}
 
     def new(self) -> list[ClusterNode]:
-        """Machines that were not there before; they are known from now on, and have answered a ping."""
+        """Machines that joined since the last call and have answered a ping."""
         import ray
 
-        found = [one for one in ray.nodes() if one["Alive"] and one["NodeID"] not in self.all]
+        found = [info for info in ray.nodes() if info["Alive"] and info["NodeID"] not in self.all]
         nodes = [
-            ClusterNode(one["NodeID"], one["NodeManagerHostname"], int(one["Resources"].get("CPU", 0.0)))
-            for one in found
+            ClusterNode(info["NodeID"], info["NodeManagerHostname"], int(info["Resources"].get("CPU", 0.0)))
+            for info in found
         ]
         nodes = sorted((node for node in nodes if node.cpus > 0), key=lambda node: node.key != self._own())
         asked = [(node, self._on(self._ping, node).remote()) for node in nodes]
         for node, answer in asked:
-            said = self._answer(answer, node, _ANSWER)
-            node.cpu, node.versions = said["cpu"], {**said["versions"], "python": said["python"]}
+            about = self._answer(answer, node, _ANSWER)
+            node.cpu, node.versions = about["cpu"], {**about["versions"], "python": about["python"]}
             self.all[node.key] = node
         return nodes
 
     def alive(self) -> list[ClusterNode]:
-        """Machines that take trials."""
+        """Machines that can be given trials."""
         import ray
 
-        there = {one["NodeID"] for one in ray.nodes() if one["Alive"]}
+        there = {info["NodeID"] for info in ray.nodes() if info["Alive"]}
         return [node for node in self.all.values() if node.used and node.key in there]
 
     def submit(self, trial: int, node: ClusterNode) -> Any:
-        """Hand a trial to a machine; returns the reference of its bytes."""
+        """Submit a trial to a machine; the reference of its packed shard."""
         return self._on(self._trial, node).remote(*self._arguments, trial)
 
     def result(self, reference: Any, node: ClusterNode) -> bytes:
-        """Bytes of a trial, waited for.
+        """Wait for a trial; its packed shard.
 
         Raises:
-            LostWorkerError: The trial ended its worker.
+            LostWorkerError: Its worker died.
             LostNodeError: The machine is gone.
-            WarpjldError: The trial could not even begin there.
+            WarpjldError: The trial could not be started there.
         """
         import ray
         import ray.exceptions as lost
@@ -131,7 +131,7 @@ class Nodes:
         return content
 
     def _lives(self, node: ClusterNode) -> bool:
-        """Whether a machine that has just lost a worker is there: it answers, or Ray still has not missed it."""
+        """Whether a machine that has just lost a worker is alive: it answers, or Ray has not reported it gone."""
         import ray
 
         began = time.monotonic()
@@ -139,7 +139,7 @@ class Nodes:
             try:
                 self._answer(self._on(self._ping, node).remote(), node, _STILL_THERE)
             except WarpjldError:
-                if all(one["NodeID"] != node.key or not one["Alive"] for one in ray.nodes()):
+                if all(info["NodeID"] != node.key or not info["Alive"] for info in ray.nodes()):
                     return False
             else:
                 return True
@@ -149,10 +149,10 @@ class Nodes:
         import ray
 
         try:
-            said: dict[str, Any] = ray.get(reference, timeout=patience)
+            about: dict[str, Any] = ray.get(reference, timeout=patience)
         except ray.exceptions.RayError as error:
             raise WarpjldError(f"{node} does not answer as warpjld does: {_first_line(error)}") from error
-        return said
+        return about
 
     @staticmethod
     def _own() -> str:
@@ -173,7 +173,7 @@ def _first_line(error: object) -> str:
 
 
 def differing(node: ClusterNode, own: dict[str, Any]) -> str:
-    """Versions of a machine that are not this one's, as words; "" where none."""
+    """Text about versions in which a machine differs from this one; empty if there are none."""
     return ", ".join(
         f"{name} {node.versions.get(name)} there, {own.get(name)} here"
         for name in MATCHING

@@ -1,4 +1,4 @@
-"""Trials on a Ray cluster: machines compute, this one alone writes."""
+"""Scheduling of trials on a Ray cluster; only the driver writes results."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from warpjld.study.shards import Shard, Shards
 
 __all__ = ["run_on_ray"]
 
-_AHEAD = 2  # trials handed out for each processor of a machine
-_LOOK = 1.0  # seconds of waiting at a time
-_JOINS = 5.0  # seconds between looks for new machines
-_PATIENCE = 60.0  # seconds that a study waits for a machine when none is left
-_CANARIES = 3
-_CONNECTS = 10.0  # seconds that a cluster's head has to answer
-_STORE = 200_000_000  # bytes of Ray's store on this machine: trials are small
+_AHEAD = 2  # trials submitted per processor of a machine
+_LOOK = 1.0  # longest wait for a result before other work is looked at [s]
+_JOINS = 5.0  # interval between looks for new machines [s]
+_PATIENCE = 60.0  # time to wait for a machine when none is left [s]
+_CANARIES = 3  # trials by which a new machine is compared with the others
+_CONNECTS = 10.0  # time for the cluster's head to answer [s]
+_STORE = 200_000_000  # size of Ray's object store on this machine [bytes]; trials are small
 
 
 def run_on_ray(
@@ -44,30 +44,30 @@ def run_on_ray(
     done: Callable[[int, str], None],
     note: Callable[[str], None],
 ) -> dict[str, Any]:
-    """Run trials on the machines of a cluster and keep each in ``folder`` as soon as it ends.
+    """Run trials on the machines of a cluster and write each to ``folder`` as soon as it ends.
 
-    A machine takes part when its versions are this one's and three canary trials give there, bit for bit, what is kept
-    already or what the first machine gave. A trial that ends its worker is run again when nothing else runs, twice at
-    most; then it becomes a row with status "crashed". A machine that goes away costs no trial anything.
+    A machine is used if its versions are the same as here, and three canary trials give, bit for bit, the results that
+    are on disk or that the first machine gave. A trial whose worker dies is run again when nothing else runs, at most
+    twice; then it becomes a row with status "crashed". Trials of a machine that leaves the cluster are run elsewhere.
 
     Args:
-        experiment: What to repeat.
+        experiment: The experiment.
         trials: Numbers of the trials to run.
-        folder: Where `Shards` are kept.
-        address: Of the cluster, or ``local`` for workers on this machine. Ray that this process has started already is
-            used as it is.
-        processes: Trials at once; as many as there are processors by default.
-        allow_mixed: Take machines whose bits differ.
+        folder: Folder of the `Shards`.
+        address: Address of the cluster, or ``local`` for workers on this machine. A Ray session that this process has
+            started already is used as it is.
+        processes: Number of trials at once; by default one per processor.
+        allow_mixed: Also use machines whose results differ in bits.
         done: Called with every finished trial and its status.
-        note: Called with what is worth knowing.
+        note: Called with messages for the user.
 
     Returns:
-        The machines, for the manifest.
+        Description of the machines, for the manifest.
 
     Raises:
         MissingExtraError: Ray is not installed.
         InputError: There is no cluster at the address, or versions differ: names the machine.
-        WarpjldError: No machine is left, or a trial cannot be run or kept.
+        WarpjldError: No machine is left, or a trial cannot be run or written.
     """
     with _connected(address, processes):
         import ray
@@ -81,7 +81,7 @@ def run_on_ray(
 
 @contextmanager
 def _connected(address: str, processes: int | None) -> Iterator[None]:
-    """Ray, started here or connected to; what runs in this process already stays as it is."""
+    """Context with a Ray connection: one that exists already, a new one to a cluster, or a local one."""
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
@@ -100,8 +100,8 @@ def _connected(address: str, processes: int | None) -> Iterator[None]:
             _listens(address)
             ray.init(address=address, **quiet)
     except (ConnectionError, ValueError, RuntimeError, OSError) as error:
-        said = str(error).strip().splitlines() or [type(error).__name__]
-        raise InputError(f"no Ray cluster at '{address}': {said[0]}") from None
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        raise InputError(f"no Ray cluster at '{address}': {lines[0]}") from None
     try:
         yield
     finally:
@@ -109,7 +109,12 @@ def _connected(address: str, processes: int | None) -> Iterator[None]:
 
 
 def _listens(address: str) -> None:
-    """Raise OSError or ValueError where nothing listens; Ray itself waits for minutes."""
+    """Check that something listens at the address, since Ray itself would wait for minutes.
+
+    Raises:
+        OSError: Nothing listens there.
+        ValueError: Not an address.
+    """
     if address == "auto":
         return
     host, colon, port = address.rpartition(":")
@@ -119,7 +124,7 @@ def _listens(address: str) -> None:
 
 
 class _Study:
-    """A run of trials over machines; see ``run_on_ray``."""
+    """State of a run of trials on a cluster; see ``run_on_ray``."""
 
     def __init__(
         self,
@@ -153,7 +158,7 @@ class _Study:
             self._alone(trial)
 
     def _join(self) -> None:
-        """Machines that came meanwhile."""
+        """Admit machines that joined meanwhile."""
         if time.monotonic() - self._looked < _JOINS:
             return
         self._looked = time.monotonic()
@@ -164,13 +169,13 @@ class _Study:
                 self._try(node)
 
     def _try(self, node: ClusterNode) -> None:
-        """Canary trials on a machine: they are kept where they were missing, and compared where they were not."""
+        """Run canary trials on a machine: compare results that are on disk already, write those that are not."""
         count = self._experiment.trials
         for trial in sorted({k * count // _CANARIES for k in range(_CANARIES)}):
             try:
                 content = self._nodes.result(self._nodes.submit(trial, node), node)
             except LostWorkerError:
-                continue  # it is tried again, as every trial is
+                continue  # it will be run again, as every trial
             except LostNodeError:
                 self._refuse(node, "went away")
                 return
@@ -180,23 +185,23 @@ class _Study:
                 if trial in self._waiting:
                     self._waiting.remove(trial)
             elif kept.results() != Shard.unpacked(content).results():
-                said = f"trial {trial} gives other bits than elsewhere"
+                finding = f"trial {trial} gives other bits than elsewhere"
                 if not self._allow_mixed:
-                    self._refuse(node, said)
+                    self._refuse(node, finding)
                     return
-                node.why = said
-                self._note(f"{node}: {said}; it takes part all the same")
+                node.why = finding
+                self._note(f"{node}: {finding}; it is used nevertheless")
 
     def _refuse(self, node: ClusterNode, why: str) -> None:
         node.used, node.why = False, why
         self._note(f"{node} is not used: {why}")
 
     def _hand_out(self) -> None:
-        """As much as machines can take."""
+        """Submit as many trials as the machines can take."""
         alive = self._usable()
         room = self._most * _AHEAD if self._most else sum(_AHEAD * node.cpus for node in alive)
         while self._waiting and len(self._out) < room:
-            node = min(alive, key=lambda one: one.busy / one.cpus)
+            node = min(alive, key=lambda candidate: candidate.busy / candidate.cpus)
             if node.busy >= _AHEAD * node.cpus:
                 return
             trial = self._waiting.popleft()
@@ -204,18 +209,24 @@ class _Study:
             node.busy += 1
 
     def _usable(self) -> list[ClusterNode]:
-        """Machines that take trials; waits for one where none is left."""
+        """Machines that can be given trials; waits for one if none is left.
+
+        Raises:
+            WarpjldError: None came within ``_PATIENCE``.
+        """
         began = time.monotonic()
         while not (alive := self._nodes.alive()):
             if not any(node.used for node in self._nodes.all.values()) or time.monotonic() - began > _PATIENCE:
-                told = "; ".join(f"{node}: {node.why}" for node in self._nodes.all.values() if node.why)
-                raise WarpjldError(f"no machine of the cluster is left to run trials on{'; ' + told if told else ''}")
+                reasons = "; ".join(f"{node}: {node.why}" for node in self._nodes.all.values() if node.why)
+                raise WarpjldError(
+                    f"no machine of the cluster is left to run trials on{'; ' + reasons if reasons else ''}"
+                )
             time.sleep(_LOOK)
             self._join()
         return alive
 
     def _take_in(self) -> None:
-        """What has ended."""
+        """Collect finished trials."""
         import ray
 
         ready, _ = ray.wait(list(self._out), num_returns=1, timeout=_LOOK) if self._out else ([], [])
@@ -230,10 +241,10 @@ class _Study:
                 self._suspects.append(trial)
 
     def _alone(self, trial: int) -> None:
-        """A trial that may have ended its worker, when nothing else runs."""
+        """Run a trial whose worker died again, while nothing else runs."""
         lives = LIVES
         while lives:
-            node = min(self._usable(), key=lambda one: one.trials)
+            node = min(self._usable(), key=lambda candidate: candidate.trials)
             try:
                 self._keep(trial, self._nodes.result(self._nodes.submit(trial, node), node), node)
             except LostNodeError:

@@ -1,4 +1,4 @@
-"""Studies that close hands on objects: the plan in a TOML file, one trial, its measures."""
+"""Grasp studies: plan from a TOML file, trials that close hands on objects, metrics of the grasps."""
 
 from warpjld.study.grasping.plan import GraspPlan, load_plan
 from warpjld.study.grasping.study import Study

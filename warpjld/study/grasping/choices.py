@@ -1,4 +1,4 @@
-"""The hands and objects of a grasp study, as a study file names them."""
+"""Hands and objects of a grasp study, as specified in the study file."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _SIZES = ("length", "breadth")
 
 @dataclass(frozen=True)
 class HandChoice:
-    """One hand: built in, at a size, or from a file.
+    """A hand: built in, with its size, or from a file.
 
     Attributes:
-        name: In the table; unique in a study.
-        side: "left" or "right"; None leaves it to the file.
-        length: Of a built-in hand, from wrist to the tip of the middle finger [m].
-        breadth: Of a built-in hand, across the palm [m].
-        resolution: Vertices of a built-in hand, about.
+        name: Name in the table; unique in a study.
+        side: "left" or "right"; None: determined by the file.
+        length: Length of a built-in hand, from wrist to the tip of the middle finger [m].
+        breadth: Breadth of a built-in hand across the palm [m].
+        resolution: Approximate number of vertices of a built-in hand.
         file: Rig file.
         skeleton: Skeleton file of a surface without joints; likewise ``unit``, ``scale``, ``up`` and ``map`` (its
             ``joint_map``), as for ``load_rig``.
@@ -50,11 +50,11 @@ class HandChoice:
     map: Path | None = None
 
     def inputs(self) -> tuple[Path, ...]:
-        """Its files."""
+        """Files it is read from."""
         return tuple(path for path in (self.file, self.skeleton, self.map) if path is not None)
 
     def moved(self, places: Mapping[Path, Path]) -> HandChoice:
-        """The same hand, its files elsewhere."""
+        """Copy that is read from other paths."""
         return replace(self, **_elsewhere(self, ("file", "skeleton", "map"), places))
 
     def load(self) -> Rig:
@@ -76,23 +76,23 @@ class HandChoice:
         )
 
     def identity(self) -> dict[str, Any]:
-        """Settings, and hashes in place of paths."""
+        """Settings, with hashes in place of paths."""
         return _hashed(asdict(self))
 
 
 @dataclass(frozen=True)
 class ObjectChoice:
-    """One object: built in, at a size, or from a file.
+    """An object: built in, with its sizes, or from a file.
 
     Attributes:
-        name: In the table; unique in a study.
+        name: Name in the table; unique in a study.
         shape: Built-in shape, or None for a file.
         sizes: Sizes of the built-in shape by name [m].
         file: Surface file.
-        unit: Unit of the file's numbers.
+        unit: Unit of the file's coordinates.
         up: The file's axis that points up.
-        mass: Mass at scale 1 [kg], or None to have it from density and volume.
-        centre: Whether a file's bounding box is put at the origin; otherwise its own frame stays.
+        mass: Mass at scale 1 [kg]; None: density times volume.
+        centre: Whether the centre of a file's bounding box is moved to the origin; else the file's frame is kept.
     """
 
     name: str
@@ -105,11 +105,11 @@ class ObjectChoice:
     centre: bool = True
 
     def inputs(self) -> tuple[Path, ...]:
-        """Its file."""
+        """File it is read from."""
         return () if self.file is None else (self.file,)
 
     def moved(self, places: Mapping[Path, Path]) -> ObjectChoice:
-        """The same object, its file elsewhere."""
+        """Copy that is read from another path."""
         return replace(self, **_elsewhere(self, ("file",), places))
 
     def load(self, scale: float) -> GraspObject:
@@ -126,12 +126,16 @@ class ObjectChoice:
         return found
 
     def identity(self) -> dict[str, Any]:
-        """Settings, and hashes in place of paths."""
+        """Settings, with hashes in place of paths."""
         return _hashed(asdict(self))
 
 
 def read_hand(table: TomlTable) -> HandChoice:
-    """A hand from a table [[hands]]."""
+    """Read a hand from a table [[hands]].
+
+    Raises:
+        InputError: Names line and key.
+    """
     if ("builtin" in table) == ("file" in table):
         table.fail("builtin", 'want either builtin = "left" or "right", or file = "…"')
     name = _name(table)
@@ -159,6 +163,7 @@ def read_hand(table: TomlTable) -> HandChoice:
 
 
 def _hand_sizes(table: TomlTable) -> tuple[dict[str, float], str]:
+    """Read the size of a built-in hand: sizes [m] by name, and words for its default name."""
     share = table.number("percentile", above=0.0, most=99.999)
     sex = table.text("sex", known=("female", "male"))
     own = {key: table.number(key, above=0.0) for key in _SIZES}
@@ -175,7 +180,11 @@ def _hand_sizes(table: TomlTable) -> tuple[dict[str, float], str]:
 
 
 def read_object(table: TomlTable) -> ObjectChoice:
-    """An object from a table [[objects]]."""
+    """Read an object from a table [[objects]].
+
+    Raises:
+        InputError: Names line and key.
+    """
     from warpjld.grasp.object_file import UNITS
     from warpjld.grasp.shapes import SHAPES
 
@@ -197,7 +206,7 @@ def read_object(table: TomlTable) -> ObjectChoice:
 
 
 def _size_names(build: Any) -> list[str]:
-    """Sizes of a built-in shape: its positional arguments."""
+    """Names of a built-in shape's sizes: its positional arguments."""
     from inspect import Parameter, signature
 
     return [p.name for p in signature(build).parameters.values() if p.kind is Parameter.POSITIONAL_OR_KEYWORD]
@@ -223,15 +232,17 @@ def _path(table: TomlTable, key: str) -> Path:
 
 
 def _elsewhere(choice: Any, names: tuple[str, ...], places: Mapping[Path, Path]) -> dict[str, Any]:
+    """Fields ``names`` of a choice with their paths replaced."""
     paths = {name: getattr(choice, name) for name in names}
     return {name: places.get(path, path) for name, path in paths.items() if path is not None}
 
 
 def _hashed(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings with name and hash in place of every path."""
     for key, value in settings.items():
         if isinstance(value, Path):
             try:
                 settings[key] = {"name": value.name, "sha256": content_hash(value)}
             except OSError as error:
-                raise InputError(f"cannot read it: {error.strerror}", path=value) from error
+                raise InputError(f"cannot be read: {error.strerror}", path=value) from error
     return settings

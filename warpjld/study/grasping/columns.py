@@ -1,6 +1,6 @@
-"""The table of a grasp study.
+"""Columns of a grasp study's table.
 
-The object does not move: its frame, Y up and its bounding box centred on the origin, is the frame of all columns.
+All columns are in the frame of the object, which does not move: Y up, the centre of its bounding box at the origin.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _PLANNED = (
     Column("friction", "number", "", "Coulomb coefficient of skin on object."),
 )
 _PLACED = (
-    Column("approach_x", "number", "", "Unit vector from the object to where the hand comes from, object frame, x."),
+    Column("approach_x", "number", "", "Unit vector from the object towards the approaching hand, object frame, x."),
     Column("approach_y", "number", "", "The same, y."),
     Column("approach_z", "number", "", "The same, z."),
     Column("gap", "number", "m", "Distance between palm and object along the approach, before closing."),
@@ -28,14 +28,14 @@ _WRIST = (
     Column("wrist_z", "number", "m", "The same, z."),
 )
 _TOUCH = (
-    Column("contacts", "integer", "", "Patches of skin in contact: one a segment of the hand that touches."),
-    Column("digits", "integer", "", "Digits in contact, thumb included, palm not."),
-    Column("area", "number", "m²", "Skin in contact."),
-    *(Column(f"area_{part}", "number", "m²", f"Skin of the {part} in contact.")
+    Column("contacts", "integer", "", "Number of contact patches: one per segment of the hand that touches."),
+    Column("digits", "integer", "", "Number of digits in contact, thumb included, palm not."),
+    Column("area", "number", "m²", "Area of skin in contact."),
+    *(Column(f"area_{part}", "number", "m²", f"Area of skin of the {part} in contact.")
       for part in ("thumb", "index", "middle", "ring", "pinky", "palm")),
 )  # fmt: skip
 _MEASURED = (
-    Column("penetration", "number", "m", "The larger of the two depths that follow."),
+    Column("penetration", "number", "m", "The larger of skin_inside and object_inside."),
     Column("skin_inside", "number", "m", "Depth of the deepest point of the skin inside the object; 0 where none is."),
     Column("object_inside", "number", "m", "Depth of the object's deepest vertex, or point of a sharp edge, inside the"
            " skin; 0 where none is."),
@@ -44,24 +44,24 @@ _MEASURED = (
            " of the hand; 0 where none is."),
     Column("touching", "text", "", "Parts of the hand in contact, of: thumb index middle ring pinky palm."),
     Column("closed", "truth", "", "Force closure with discretised cones (Nguyen 1988)."),
-    Column("margin", "number", "", "Evenness of the closing force: smallest share of a cone edge × number of edges."),
-    Column("epsilon", "number", "N", "Ferrari–Canny epsilon, 1 N of normal force, torques over torque_scale."),
-    Column("volume", "number", "N⁶", "Volume of the grasp wrench space, likewise."),
-    Column("torque_scale", "number", "m", "Length that torques are divided by."),
+    Column("margin", "number", "", "Evenness of the internal force: smallest share of a cone edge × number of edges."),
+    Column("epsilon", "number", "N", "Ferrari–Canny epsilon for 1 N of normal force, torques divided by torque_scale."),
+    Column("volume", "number", "N⁶", "Volume of the grasp wrench space, for the same forces."),
+    Column("torque_scale", "number", "m", "Length ρ that torques are divided by."),
     Column("mass", "number", "kg", "Mass of the object."),
     Column("displacement", "number", "m", "Largest displacement of the centre of mass under gravity from ±x, ±y, ±z;"
            " empty where a direction is not held."),
-    Column("held", "integer", "", "Directions of the six in which the weight is held."),
-    Column("lift", "number", "", "Times the object's weight that is held against gravity along −y by normal"
-           " forces of squeeze in all; above 1 it is lifted, quasi-statically."),
-    Column("lift_least", "number", "", "The least of the same for gravity along ±x, ±y, ±z."),
+    Column("held", "integer", "", "In how many of these six directions the weight is held."),
+    Column("lift", "number", "", "Multiple of the object's weight that is held against gravity along −y by a total"
+           " normal force of squeeze; above 1 it is lifted, quasi-statically."),
+    Column("lift_least", "number", "", "Smallest lift over gravity along ±x, ±y, ±z."),
     Column("success", "truth", "", "Force closure, penetration and displacement within the study's limits."),
 )  # fmt: skip
 
 GRASP_COLUMNS = (*_PLANNED, *_PLACED, *_WRIST, *_TOUCH, *_MEASURED)
-"""Columns after the ones every study has."""
+"""Columns of a grasp study after ``COMMON_COLUMNS``."""
 
 SCORE_COLUMNS = (
-    Column("grasp", "text", "", "What the file of grasps calls it."), *_PLANNED, *_WRIST, *_TOUCH, *_MEASURED
+    Column("grasp", "text", "", "Name of the grasp in its file."), *_PLANNED, *_WRIST, *_TOUCH, *_MEASURED
 )  # fmt: skip
-"""Likewise for grasps of others: how the hand came there is not known."""
+"""Columns for grasps from other programs, whose approach is unknown."""

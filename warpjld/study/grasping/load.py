@@ -1,4 +1,4 @@
-"""Hands and objects of a grasp study, loaded once in a process."""
+"""Loading of a grasp study's hands and objects, cached per process."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from warpjld.covering.kept import bind_kept
 from warpjld.errors import InputError
 from warpjld.grasp import GraspObject, ObjectSet
 from warpjld.grasp.close import Closer
-from warpjld.grasp.finer import FinerSkin
 from warpjld.grasp.palm import Palm, palm_of
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.segments import vertex_segments
+from warpjld.grasp.subdivided_skin import FinerSkin
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, Skeleton, poses_from_angles
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
@@ -26,7 +26,7 @@ from warpjld.study.grasping.plan import Posture
 
 __all__ = ["Hand", "Opened", "Thing", "closer_of", "device_identity", "hand_of", "opened_hand", "thing_of"]
 
-_SPACING = 1.5e-3  # of the points that stand for skin [m]
+_SPACING = 1.5e-3  # spacing of the sample points on the skin [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +34,12 @@ class Hand:
     """A hand ready for trials.
 
     Attributes:
-        rig: As built or read.
-        covering: Bound.
-        side: Which hand it is.
-        palm: Where its palm is.
-        finer: Its skin with points 1.5 mm apart, for contacts.
-        parts: Place in ``SEGMENTS`` of every such point's segment, shape (n,); -1 for what is no hand.
+        rig: The rig.
+        covering: Its covering.
+        side: ``left`` or ``right``.
+        palm: Frame of the palm, on the skin.
+        finer: Its skin with sample points 1.5 mm apart, for contacts.
+        parts: Index into ``SEGMENTS`` of every sample point, shape (n,); -1 for points of no hand.
     """
 
     rig: Rig
@@ -52,11 +52,11 @@ class Hand:
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """A hand about to close.
+    """An open hand before it closes.
 
     Attributes:
         angles: Joint angles [rad], shape (J, 4).
-        skin: Its skin, the root at rest [m], shape (V, 3).
+        skin: Its skin with the root at rest [m], shape (V, 3).
     """
 
     angles: NDArray[np.float64]
@@ -68,8 +68,8 @@ class Thing:
     """An object ready for trials, at its scale.
 
     Attributes:
-        objects: The only one of its set.
-        mass: [kg].
+        objects: Search structures of this one object.
+        mass: Its mass [kg].
         radius: Largest distance of its surface from its centre of mass [m].
     """
 
@@ -84,7 +84,7 @@ class Thing:
 
 
 def device_identity(device: str) -> dict[str, str]:
-    """What of a device decides last bits: nothing for the CPU, else which it is.
+    """Part of an experiment's identity that depends on the device: empty for the CPU, else the device's name.
 
     Raises:
         InputError: There is no such device.
@@ -95,7 +95,7 @@ def device_identity(device: str) -> dict[str, str]:
 
 @lru_cache(maxsize=4)
 def hand_of(choice: HandChoice) -> Hand:
-    """Build or read a hand and bind it; kept for the process.
+    """Build or read a hand and bind it; cached for the process.
 
     Raises:
         InputError: It cannot be used, or is not one hand.
@@ -113,7 +113,7 @@ def hand_of(choice: HandChoice) -> Hand:
 
 @lru_cache(maxsize=32)
 def opened_hand(choice: HandChoice, posture: Posture) -> Opened:
-    """A hand in the posture closing starts from; kept for the process.
+    """A hand in its open posture; cached for the process.
 
     Raises:
         InputError: A posture beyond the joints' limits.
@@ -143,13 +143,13 @@ def _angles(skeleton: Skeleton, posture: tuple[tuple[str, str, float], ...], nam
 
 @lru_cache(maxsize=32)
 def thing_of(choice: ObjectChoice, scale: float, density: float, device: str = "cpu") -> Thing:
-    """Build or read an object at a scale, for distances on a Warp device; kept for the process.
+    """Build or read an object at a scale, for distances on a Warp device; cached for the process.
 
     Raises:
         InputError: It cannot be used, or has neither volume nor mass.
     """
     body = choice.load(scale)
-    # a given mass is that of the object as it is; a larger one is heavier by its volume
+    # a given mass is for scale 1; at other scales it is proportional to the volume
     mass = density * abs(body.volume) if choice.mass is None else choice.mass * scale**3
     if not mass > 0.0:
         raise InputError(f"object {choice.name}: encloses no volume; give it a mass")
@@ -159,7 +159,7 @@ def thing_of(choice: ObjectChoice, scale: float, density: float, device: str = "
 
 @lru_cache(maxsize=32)
 def closer_of(choice: HandChoice, wanted: ObjectChoice, scale: float, density: float) -> Closer:
-    """What closes a hand on an object; kept for the process.
+    """``Closer`` of a hand on an object; cached for the process.
 
     Raises:
         InputError: Hand or object cannot be used.

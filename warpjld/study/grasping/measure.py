@@ -1,4 +1,4 @@
-"""All measures of one grasp, as columns of the table."""
+"""All metrics of one grasp, as values of the table's columns."""
 
 from __future__ import annotations
 
@@ -30,15 +30,18 @@ _DOWN = int((SIX_DIRECTIONS @ [0.0, -1.0, 0.0]).argmax())
 def measure_grasp(
     hand: Hand, thing: Thing, both: HandObjectGaps, vertices: NDArray[np.float32], friction: float, how: Measuring
 ) -> tuple[dict[str, Any], ContactPatches]:
-    """Columns of the table, and the patches of contact; definitions are in `warpjld.grasp.quality`, one a measure.
+    """Measure a grasp; `warpjld.grasp.quality` defines the metrics, one per file.
 
     Args:
-        hand: Whose skin.
-        thing: What is held.
-        both: The two beside one another.
-        vertices: The deformed skin [m], shape (V, 3), in the object's frame.
+        hand: The hand.
+        thing: The object.
+        both: Distances between the two.
+        vertices: The deformed skin in the object's frame [m], shape (V, 3).
         friction: Coulomb coefficient.
         how: Settings.
+
+    Returns:
+        Values by column, and the contact patches.
     """
     body, scale = thing.body, how.torque_scale or thing.radius
     (patches,), (deepest,) = touching_patches(hand.finer, hand.parts, both.near, vertices[None], how.contact)

@@ -29,15 +29,15 @@ def grasp_views(
     opacity: float = 1.0,
     size: tuple[int, int] = _SIZE,
 ) -> list[NDArray[np.uint8]]:
-    """Pictures of the closed hand of an outcome, one a view.
+    """Pictures of the closed hand of an outcome, one per view.
 
     Args:
-        hand: That of the trial.
-        body: What is held.
-        outcome: With a pose.
-        views: Names as for `warpjld.render.Camera.view`; the palm is the front.
-        opacity: Of the object.
-        size: Width and height.
+        hand: The trial's hand.
+        body: The object.
+        outcome: The trial's outcome.
+        views: Names of views as for `warpjld.render.Camera.view`; the palm is the front.
+        opacity: Opacity of the object, 0 to 1.
+        size: Width and height [pixels].
 
     Returns:
         Arrays (height, width, 3); none where the hand was not closed.
@@ -65,14 +65,14 @@ def grasp_views(
 
 
 def draw_grasp(hand: Hand, body: GraspObject, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
-    """Draw the closed hand of an outcome from three sides, the object once solid and once translucent.
+    """Draw the closed hand of an outcome from three sides, with the object opaque and translucent.
 
     Args:
-        hand: That of the trial.
-        body: What is held.
-        trial: Its number.
-        outcome: With a pose; there is nothing to draw where the hand was not closed.
-        folder: Where to.
+        hand: The trial's hand.
+        body: The object.
+        trial: The trial's number.
+        outcome: Its outcome; nothing is drawn if the hand was not closed.
+        folder: Output folder.
 
     Returns:
         The files written: none, or ``grasp.png``.

@@ -1,4 +1,4 @@
-"""A grasp study's plan, read from a TOML file."""
+"""Plan of a grasp study, read from a TOML file."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, 
 
 __all__ = ["COMPUTING", "GraspPlan", "Measuring", "WristRange", "load_plan"]
 
-COMPUTING = ("warpjld", "numpy", "scipy", "warp-lang")  # another version may give other last digits
+COMPUTING = ("warpjld", "numpy", "scipy", "warp-lang")
+"""Packages whose versions belong to a study's identity, since another version may give other last digits."""
 
 
 @dataclass(frozen=True)
 class WristRange:
-    """Where the wrist is drawn from; each pair is a range with even probability.
+    """Ranges that the wrist's placement is drawn from; each pair is a uniform distribution.
 
     Attributes:
-        elevation: Angle above the horizon that the hand comes from [°]; even over the sphere's area.
-        azimuth: Direction that it comes from, about the object's Y axis, 0 along +Z [°].
-        roll: Turn of the fingers about the direction of approach [°].
+        elevation: Elevation of the direction that the hand comes from [°]; uniform over the sphere's area.
+        azimuth: Azimuth of that direction about the object's Y axis, 0 along +Z [°].
+        roll: Rotation of the fingers about the direction of approach [°].
         tilt: Angle between the palm's normal and the direction of approach [°].
         gap: Distance from palm to object along the approach [m].
-        offset: How far beside the object's centre the palm aims, as a share of the object's half extent.
-        best_of: 0 draws one placement from these ranges; n takes the best of n as `warpjld.grasp.auto.find_grasp` (the
-            script's GRASP … AUTO) finds it, and the ranges say nothing.
+        offset: Distance of the palm's aim from the object's centre, relative to the object's half extent.
+        best_of: 0 draws one placement from these ranges; n takes the best grasp of n placements of
+            `warpjld.grasp.find_grasp.find_grasp` (the script's GRASP … AUTO), and the ranges are not used.
     """
 
     elevation: tuple[float, float] = (-90.0, 90.0)
@@ -42,24 +43,24 @@ class WristRange:
 
 
 Posture = str | tuple[tuple[str, str, float], ...]
-"""Name of a posture, "auto" for one that suits the object's shape; or joints without side, channels, and angles [°]."""
+"""Name of a posture, or "auto" for one chosen by the object's shape; or (joint without side, channel, angle [°])."""
 
 
 @dataclass(frozen=True)
 class Measuring:
-    """How a grasp is measured and what counts as success.
+    """Settings of the metrics, and limits for success.
 
     Attributes:
         contact: Largest distance of skin that counts as contact [m].
-        edges: Edges of the friction cones.
+        edges: Number of edges of the friction cones.
         norm: Norm of the wrench space, "L1" or "Linf".
-        torque_scale: Length torques are divided by [m]; None takes the object's largest radius about its centre.
-        density: Of objects without a mass [kg/m³].
+        torque_scale: Length torques are divided by [m]; None: the object's largest radius about its centre of mass.
+        density: Density of objects without a given mass [kg/m³].
         squeeze: Sum of normal forces before gravity acts [N].
-        normal_stiffness: Of the skin at a contact [N/m].
-        tangential_stiffness: Likewise, along the surface [N/m].
-        penetration: Deepest penetration of a success [m].
-        displacement: Largest displacement under gravity of a success [m]; None asks for none.
+        normal_stiffness: Normal stiffness of the skin at a contact [N/m], see ``gravity_displacement``.
+        tangential_stiffness: Tangential stiffness likewise [N/m].
+        penetration: Largest penetration of a success [m].
+        displacement: Largest displacement under gravity of a success [m]; None: no limit.
     """
 
     contact: float = 5e-4
@@ -76,9 +77,10 @@ class Measuring:
 
 @dataclass(frozen=True)
 class GraspPlan:
-    """All of a study but its number of trials decides what trial k is: studies can be made longer later.
+    """Plan of a grasp study.
 
-    Trial k takes combination k modulo hands × objects × scales × frictions, in this order, frictions fastest.
+    Trial k uses combination k modulo hands × objects × scales × frictions, frictions varying fastest. It does not
+    depend on the number of trials, so a study can be extended later.
     """
 
     title: str
@@ -102,7 +104,7 @@ class GraspPlan:
         return self.hands[rest % len(self.hands)], self.objects[thing], self.scales[scale], self.frictions[friction]
 
     def identity(self) -> dict[str, Any]:
-        """All that decides the results, as JSON; hashes stand for files."""
+        """Everything that determines the results, as JSON, with hashes in place of files."""
         settings = asdict(self)
         del settings["trials"], settings["title"]
         settings["hands"] = [hand.identity() for hand in self.hands]

@@ -1,4 +1,4 @@
-"""A grasp study: a plan from a file, run, resumed, and single trials of it run again."""
+"""Grasp study as one object: load a plan, check it, run or resume it, rerun single trials, export."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Study:
     """A study that closes hands on objects many times, and brings the grasps into one table.
 
     Attributes:
-        plan: What is tried.
+        plan: The plan.
         device: Warp device of the covering and of distances to objects; hands close on the CPU.
 
     Examples:
@@ -56,13 +56,13 @@ class Study:
         """Read a plan (TOML).
 
         Raises:
-            InputError: It cannot be read, or asks for what cannot be; names the line or key.
+            InputError: It cannot be read, or a value is invalid; names line and key.
         """
         return cls(load_plan(Path(path)), device)
 
     @property
     def experiment(self) -> GraspExperiment:
-        """What is repeated."""
+        """The experiment that ``run_study`` repeats."""
         return GraspExperiment(self.plan, self.device)
 
     def check(self) -> tuple[list[str], list[str]]:
@@ -84,7 +84,7 @@ class Study:
         allow_mixed: bool = False,
         report: Callable[[str, int, int], None] = lambda what, done, total: None,
     ) -> StudyResult:
-        """Run what is missing of the study in a folder; arguments and errors as of ``run_study``."""
+        """Run the missing trials of the study in a folder; arguments and errors as for ``run_study``."""
         return run_study(
             self.experiment,
             out,
@@ -104,7 +104,7 @@ class Study:
         *,
         report: Callable[[str, int, int], None] = lambda what, done, total: None,
     ) -> Rerun:
-        """Run one trial again, compare it with what is there, and draw it; errors as of ``rerun_trial``."""
+        """Run one trial again, compare it with the stored result, and draw it; errors as for ``rerun_trial``."""
         return rerun_trial(self.experiment, out, trial, report=report)
 
     def export(self, out: str | Path, kinds: Sequence[str], *, trials: Sequence[int] | None = None) -> list[Path]:
@@ -112,8 +112,8 @@ class Study:
 
         Args:
             out: The study's folder.
-            kinds: Some of ``isaac`` (isaac_grasp YAML 1.0), ``dexgraspbench`` (``.npy``) and ``mesh`` (OBJ and GLB of
-                hand and object, and maps of contact).
+            kinds: Formats: ``isaac`` (isaac_grasp YAML 1.0), ``dexgraspbench`` (``.npy``), ``mesh`` (OBJ and GLB of
+                hand and object, and contact maps).
             trials: Numbers of trials; all that closed if left out.
 
         Raises:

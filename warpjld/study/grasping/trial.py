@@ -1,4 +1,4 @@
-"""One trial of a grasp study: a wrist is drawn beside the object, the hand closes, the grasp is measured."""
+"""Trials of a grasp study: draw a placement of the open hand, close the hand, measure the grasp."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
-from warpjld.grasp.auto import find_grasp
 from warpjld.grasp.close import Closer
+from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.postures import posture_for
@@ -34,13 +34,13 @@ __all__ = ["GraspExperiment"]
 
 Array = NDArray[np.float64]
 
-_CLEAR = 5e-4  # the open hand starts at least this far from the object [m]
-_BACKED_OFF = 0.25  # a palm that cannot come nearer than this is not beside the object [m]
+_CLEAR = 5e-4  # smallest distance of the open hand from the object [m]
+_BACKED_OFF = 0.25  # largest distance that the open hand is moved back to reach that [m]
 
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A hand that has closed: angles (J, 4), displacement and rotation of its root, whether it touches, columns."""
+    """A closed hand: angles (J, 4), displacement and rotation of its root, whether it touches, values by column."""
 
     angles: Array
     position: Array
@@ -51,7 +51,7 @@ class _Tried:
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """A hand that is held open beside the object: angles (J, 4), displacement and rotation of its root, columns."""
+    """A placed open hand: angles (J, 4), displacement and rotation of its root, values by column."""
 
     angles: Array
     position: Array
@@ -61,7 +61,7 @@ class _Open:
 
 @dataclass(frozen=True)
 class GraspExperiment:
-    """The experiment of a plan, for `warpjld.study.run_study`.
+    """Experiment of a grasp plan, for `warpjld.study.run_study`.
 
     Attributes:
         settings: The plan.
@@ -79,16 +79,16 @@ class GraspExperiment:
 
     @property
     def trials(self) -> int:
-        """How many."""
+        """Number of trials."""
         return self.settings.trials
 
     @property
     def seed(self) -> int:
-        """Of the study."""
+        """Seed of the study."""
         return self.settings.seed
 
     def identity(self) -> dict[str, Any]:
-        """See `GraspPlan.identity`; another device gives other last bits."""
+        """Identity of the plan (see `GraspPlan.identity`) and of the device, whose last bits may differ."""
         return self.settings.identity() | device_identity(self.device)
 
     def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
@@ -101,18 +101,18 @@ class GraspExperiment:
         return (*hands, *(path for thing in self.settings.objects for path in thing.inputs()))
 
     def moved(self, places: Mapping[Path, Path]) -> GraspExperiment:
-        """The same study, these files elsewhere."""
+        """Copy that reads its files from other paths."""
         hands = tuple(hand.moved(places) for hand in self.settings.hands)
         objects = tuple(thing.moved(places) for thing in self.settings.objects)
         return replace(self, settings=replace(self.settings, hands=hands, objects=objects))
 
     def plan(self, trial: int) -> dict[str, Any]:
-        """What is known beforehand."""
+        """Columns that are known before the trial."""
         hand, thing, scale, friction = self.settings.combination(trial)
         return {"hand": hand.name, "object": thing.name, "scale": scale, "friction": friction}
 
     def check(self) -> list[str]:
-        """Load everything once: better now than in the middle of a study. Returns what is worth knowing.
+        """Load all hands and objects once, to find errors before the study; returns notes on them.
 
         Raises:
             InputError: A hand or object cannot be used.
@@ -129,7 +129,7 @@ class GraspExperiment:
         return notes
 
     def doubts(self) -> list[str]:
-        """What looks suspicious: a hand's size, joints taken for others, objects in another unit than is said.
+        """Warnings about suspicious inputs: a hand's size, doubtful joints, objects that may be in another unit.
 
         Raises:
             InputError: A hand or object cannot be used.
@@ -144,13 +144,13 @@ class GraspExperiment:
         return found
 
     def begin(self) -> None:
-        """Keep Warp's remarks off the output of a command that runs many workers."""
+        """Silence Warp's messages in a worker."""
         from warpjld.runtime.quiet import silence_warp
 
         silence_warp()
 
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
-        """Place, close, measure."""
+        """Place the hand, close it, measure the grasp."""
         choice, wanted, scale, friction = self.settings.combination(trial)
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         best_of = self.settings.wrist.best_of
@@ -175,11 +175,11 @@ class GraspExperiment:
         return Outcome("closed" if tried.touches else "no contact", {**tried.values, **placed, **measured}, arrays)
 
     def alike(self, trial: int) -> tuple[HandChoice, ObjectChoice, float]:
-        """Hand, object and scale: hands on one object close together."""
+        """Hand, object and scale; trials in which these are equal are closed in one batch."""
         return self.settings.combination(trial)[:3]
 
     def look_ahead(self, trials: Sequence[int]) -> None:
-        """Close the hands of trials that are alike together. Each ends bit for bit as it does alone."""
+        """Close the hands of similar trials in one batch; the results are bit for bit those of single trials."""
         self._ahead.clear()
         if self.settings.wrist.best_of:
             return
@@ -187,20 +187,20 @@ class GraspExperiment:
         try:
             placed = [self._placed(choice, wanted, scale, generator(self.seed, trial)) for trial in trials]
             self._ahead.update(zip(trials, self._closed(placed, choice, wanted, scale), strict=True))
-        except Exception:  # whose it is comes out when they are run alone
+        except Exception:  # the trial that failed is found when they are run one by one
             self._ahead.clear()
 
     def _placed(
         self, choice: HandChoice, wanted: ObjectChoice, scale: float, rng: np.random.Generator
     ) -> _Open | Outcome:
-        """One placement drawn from the plan's ranges."""
+        """Draw one placement from the plan's ranges."""
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         approach = draw_approach(self.settings.wrist, rng, thing.body.size)
         values = {**_direction(approach.direction), "gap": approach.gap, "tilt": approach.tilt}
         start = approach.aim + 4.0 * thing.radius * approach.direction
         way = touch_along(thing.objects, start, -approach.direction, 8.0 * thing.radius)
         if way is None:
-            return Outcome("missed", values, message="the line of approach passes beside the object")
+            return Outcome("missed", values, message="the line of approach misses the object")
         turn, shift = place_palm(hand.palm, approach, start + (approach.gap - way) * approach.direction)
         posture = self.settings.posture
         opened = opened_hand(choice, posture_for(thing.body.size) if posture == "auto" else posture)
@@ -216,25 +216,25 @@ class GraspExperiment:
     def _closed(
         self, placed: Sequence[_Open | Outcome], choice: HandChoice, wanted: ObjectChoice, scale: float
     ) -> list[_Tried | Outcome]:
-        """Open hands on one object, closed; what is no hand stays as it is."""
-        hands = [one for one in placed if isinstance(one, _Open)]
+        """Close open hands on one object in a batch; outcomes of failed placements are passed through."""
+        hands = [hand for hand in placed if isinstance(hand, _Open)]
         if not hands:
-            return [one for one in placed if isinstance(one, Outcome)]
-        closer, angles = self._closer(choice, wanted, scale), np.stack([one.angles for one in hands])
+            return [failed for failed in placed if isinstance(failed, Outcome)]
+        closer, angles = self._closer(choice, wanted, scale), np.stack([hand.angles for hand in hands])
         poses = poses_from_angles(
             closer.covering.skeleton,
             angles,
-            root_position=np.stack([one.position for one in hands]),
-            root_rotation=np.stack([one.rotation for one in hands]),
+            root_position=np.stack([hand.position for hand in hands]),
+            root_rotation=np.stack([hand.rotation for hand in hands]),
         )
         coupling = self.settings.coupling if any(self.settings.coupling) else None
         closed = closer.close(poses, angles, digits=self.settings.digits, coupling=coupling)
         touches = np.asarray(closed.touching().any(axis=1))
         ended = iter(
-            _Tried(closed.angles[g], one.position, one.rotation, bool(touches[g]), one.values)
-            for g, one in enumerate(hands)
+            _Tried(closed.angles[g], hand.position, hand.rotation, bool(touches[g]), hand.values)
+            for g, hand in enumerate(hands)
         )
-        return [one if isinstance(one, Outcome) else next(ended) for one in placed]
+        return [item if isinstance(item, Outcome) else next(ended) for item in placed]
 
     def _best_of(
         self,
@@ -245,7 +245,7 @@ class GraspExperiment:
         friction: float,
         rng: np.random.Generator,
     ) -> _Tried | Outcome:
-        """The best of some placements, as the script's GRASP … AUTO takes it."""
+        """The best grasp of ``count`` placements, by ``find_grasp`` as in the script's GRASP … AUTO."""
         posture = self.settings.posture
         assert isinstance(posture, str)
         try:
@@ -266,7 +266,7 @@ class GraspExperiment:
         return _Tried(found.angles, found.position, found.rotation, bool(found.touching), values)
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
-        """Three views of the closed hand on its object, see `draw_grasp`."""
+        """Draw three views of the closed hand and its object, see `draw_grasp`."""
         from warpjld.study.grasping.pictures import draw_grasp
 
         choice, wanted, scale, _ = self.settings.combination(trial)
@@ -288,19 +288,19 @@ def _direction(away: Array) -> dict[str, Any]:
 
 
 def _room(opened: Array, near: NearObject, turn: Array, shift: Array, approach: Approach) -> float | None:
-    """How far the open hand must be moved back until it is clear of the object [m]; None if too far."""
+    """Distance the open hand must be moved back to be clear of the object [m]; None if more than ``_BACKED_OFF``."""
     skin, back = opened @ turn.T + shift, 0.0
     while back <= _BACKED_OFF:
         nearest = float(near.least((skin + back * approach.direction)[None])[0])
         if nearest >= _CLEAR:
             return back
-        # not nearer than this can it be clear: the object is that deep in the hand
+        # lower bound of the remaining distance
         back += max(_CLEAR - nearest, 1e-4)
     return None
 
 
 def _by_segment(patches: ContactPatches) -> dict[str, Array]:
-    """Patches in rows of ``SEGMENTS``, NaN where a segment does not touch."""
+    """Contact patches as arrays with one row per segment of ``SEGMENTS``, NaN where a segment does not touch."""
     rows = [SEGMENTS.index(name) for name in patches.names]
     out = {}
     for name, values in (

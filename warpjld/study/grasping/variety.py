@@ -1,4 +1,4 @@
-"""How different a study's grasps are from one another, hand by hand."""
+"""Diversity of a study's grasps, by hand."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ __all__ = ["varieties"]
 def varieties(
     hands: Iterable[HandChoice], rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]
 ) -> dict[str, Any]:
-    """See `warpjld.grasp.quality.diversity`: of every hand's grasps, and of those of them that succeeded.
+    """`warpjld.grasp.quality.diversity` of every hand's grasps (``all``) and of its ``successes``, by hand's name.
 
     Args:
-        hands: The study's.
+        hands: The study's hands.
         rows: The table.
-        arrays: As in ``poses.npz``.
+        arrays: Arrays as in ``poses.npz``.
     """
     return {hand.name: _of_hand(hand, rows, arrays) for hand in hands if f"{hand.name}/angles" in arrays}
 

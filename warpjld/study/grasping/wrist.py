@@ -1,4 +1,4 @@
-"""Placing a hand beside an object: how wrists are drawn at random, and where that brings the hand."""
+"""Random placement of a hand beside an object: draw an approach, and place the palm there."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """One draw of the wrist, in the object's frame.
+    """A random approach, in the object's frame.
 
     Attributes:
-        direction: Unit vector from the object to where the hand comes from, shape (3,).
-        aim: Where in the object the palm aims at [m], shape (3,).
-        fingers: Unit direction of the fingers, normal to ``direction``, shape (3,).
-        tilt: Angle of the palm's normal to the approach, about an axis at angle ``about`` [rad].
-        about: See ``tilt``.
+        direction: Unit vector from the object towards the approaching hand, shape (3,).
+        aim: Point in the object that the palm aims at [m], shape (3,).
+        fingers: Unit direction of the fingers, perpendicular to ``direction``, shape (3,).
+        tilt: Angle between the palm's normal and the approach [rad].
+        about: Angle of the tilt's axis, from ``fingers`` about ``direction`` [rad].
         gap: Distance left between palm and object along the approach [m].
     """
 
@@ -39,12 +39,12 @@ class Approach:
 
 
 def draw_approach(ranges: WristRange, rng: np.random.Generator, extent: Array) -> Approach:
-    """Draw a wrist. Always takes the same number of random numbers.
+    """Draw an approach; always consumes the same number of random numbers.
 
     Args:
-        ranges: Where from.
-        rng: Source of randomness.
-        extent: Extent of the object along its axes [m], its middle at the origin.
+        ranges: Ranges of the plan.
+        rng: Source of random numbers.
+        extent: Extent of the object along its axes [m], shape (3,), with its centre at the origin.
     """
     low, high = np.sin(np.radians(ranges.elevation))
     height = rng.uniform(low, high)
@@ -55,17 +55,14 @@ def draw_approach(ranges: WristRange, rng: np.random.Generator, extent: Array) -
     gap = rng.uniform(*ranges.gap)
     aside = rng.normal(size=3)
     aside *= rng.uniform(*ranges.offset) / np.linalg.norm(aside)
-    # upright, fingers across; then rolled about the approach
+    # fingers horizontal, then rolled about the approach
     level = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
     fingers = Rotation.from_rotvec(roll * direction).apply(level)
     return Approach(direction, aside * extent / 2.0, fingers, float(tilt), float(about), float(gap))
 
 
 def touch_along(objects: ObjectSet, start: Array, direction: Array, reach: float) -> float | None:
-    """How far a point moves along a direction until it meets the object [m]; None if it misses.
-
-    Sphere tracing (Hart 1996): steps of the distance itself.
-    """
+    """Distance along a ray to the object [m], by sphere tracing (Hart 1996); None if it is missed."""
     travelled = 0.0
     for _ in range(200):
         gap = float(objects.distances(start[None] + travelled * direction, threads=1).distance[0, 0])
@@ -78,7 +75,7 @@ def touch_along(objects: ObjectSet, start: Array, direction: Array, reach: float
 
 
 def place_palm(palm: Palm, approach: Approach, point: Array) -> tuple[Array, Array]:
-    """Rotation (3, 3) and translation (3,) that bring a palm to a point, facing against the approach, tilted."""
+    """Rotation (3, 3) and translation (3,) [m] that place a palm at a point, facing the object with the tilt."""
     across = np.cross(approach.direction, approach.fingers)
     axis = np.cos(approach.about) * approach.fingers + np.sin(approach.about) * across
     turn = Rotation.from_rotvec(approach.tilt * axis).as_matrix() @ palm.turned_to(

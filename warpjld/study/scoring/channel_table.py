@@ -1,8 +1,8 @@
-"""Grasps as rows of a CSV file, angles in degrees.
+"""Reader of grasps from CSV files, one per row, angles in degrees.
 
-``object`` and the hand's pose in the object's frame, ``x``, ``y``, ``z`` [m] and ``qw``, ``qx``, ``qy``, ``qz``; then
-a column a joint, ``index.base.flexion`` or what a joint map says. ``name``, ``hand``, ``scale``, ``friction`` and
-``mass`` [kg] may be there. An empty cell is an angle as at rest.
+Columns: ``object``; the hand's pose in the object's frame, ``x``, ``y``, ``z`` [m] and ``qw``, ``qx``, ``qy``, ``qz``;
+one column per joint, ``index.base.flexion`` or a name from the joint map; optionally ``name``, ``hand``, ``scale``,
+``friction`` and ``mass`` [kg]. An empty cell is the rest angle.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ _OTHER = ("name", "hand", "scale", "friction", "mass")
 
 
 def read_channel_table(path: Path, how: GraspReading) -> list[GivenGrasp]:
-    """Grasps of a file.
+    """Read the grasps of a CSV file.
 
     Raises:
-        InputError: Columns that are missing or twice, cells that are no numbers, joints that are none: names the line.
+        InputError: Missing or repeated columns, cells that are no numbers, unknown joints; names the line.
     """
     text = read_text(path)
     with reading(path, "CSV"):
         rows = [row for row in csv.reader(StringIO(text)) if row]
     if len(rows) < 2:
-        raise InputError("want a line of column names, and a line a grasp", path=path)
+        raise InputError("want a line of column names, and one line per grasp", path=path)
     header = [name.strip() for name in rows[0]]
     if missing := [name for name in _NEEDED if name not in header]:
         raise InputError(f"has no column {', '.join(missing)}", path=path, line=1)

@@ -1,9 +1,9 @@
-"""Grasps as DexGraspBench (Chen, Ke & Wang 2025) has them: a dictionary in an ``.npy`` file.
+"""Reader of grasps in the format of DexGraspBench (Chen, Ke & Wang 2025): a dictionary in an ``.npy`` file.
 
-``grasp_qpos`` holds position [m], quaternion w, x, y, z and joint angles [rad] of the hand in the world, one grasp or
-one a row; ``obj_pose`` the object's position and quaternion there, ``obj_scale`` its scale, ``obj_path`` its file or
-folder. Names of joints stand in ``joint_names`` where we wrote the file, else in a joint map's ``order``.
-``pregrasp_qpos`` and ``squeeze_qpos`` are not looked at: the grasp is judged.
+``grasp_qpos`` holds position [m], quaternion w, x, y, z and joint angles [rad] of the hand in the world, for one grasp
+or one per row; ``obj_pose`` the object's position and quaternion, ``obj_scale`` its scale, ``obj_path`` its file or
+folder. Joints are named by ``joint_names`` in files that warpjld wrote, else by a joint map's ``order``.
+``pregrasp_qpos`` and ``squeeze_qpos`` are ignored.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 def is_dexgraspbench(content: Any) -> bool:
-    """Whether a file's content is of this kind."""
+    """Whether a file's content is in this format."""
     return isinstance(content, Mapping) and "grasp_qpos" in content
 
 
@@ -34,11 +34,11 @@ def dexgraspbench_grasps(content: Mapping[str, Any], name: str, how: GraspReadin
 
     Args:
         content: The dictionary.
-        name: What to call the grasp; with several each has its row behind it.
-        how: What is known besides.
+        name: Name of the grasp; several grasps get their row appended.
+        how: Hand, joint map and other settings.
 
     Raises:
-        InputError: Fields that are missing, or of other shapes.
+        InputError: Missing fields, or wrong shapes.
     """
     poses = _rows(content, "grasp_qpos", 8, more=True)
     count = len(poses)
@@ -62,7 +62,7 @@ def dexgraspbench_grasps(content: Mapping[str, Any], name: str, how: GraspReadin
         scale = number_in(scales[k if len(scales) > 1 else 0], "obj_scale", above=0.0)
         stands = Places.of(place[:3], quaternion(place[3:], "obj_pose"))
         turn = quaternion(pose[3:7], f"{called}: grasp_qpos")
-        joints = how.names.named(pose[7:].tolist(), [str(one) for one in names])
+        joints = how.names.named(pose[7:].tolist(), [str(joint) for joint in names])
         grasps.append(how.posed(called, thing, pose[:3], turn, joints, place=stands, scale=scale, **more))
     return grasps
 

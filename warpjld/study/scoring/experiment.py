@@ -1,4 +1,4 @@
-"""Grasps of others judged: the trials of a study whose hands are where somebody else put them."""
+"""Scoring of given grasps as an experiment: each trial measures one grasp."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ __all__ = ["ScoreExperiment", "Scored"]
 
 @dataclass(frozen=True, eq=False)
 class Scored:
-    """One grasp to be judged, with all that it wants.
+    """One grasp to be scored, with its hand and object.
 
     Attributes:
-        grasp: As it was given.
-        hand: Whose it is.
-        thing: What is held.
+        grasp: The grasp as read.
+        hand: The hand.
+        thing: The object.
         friction: Coulomb coefficient.
     """
 
@@ -43,12 +43,12 @@ class Scored:
 
 @dataclass(frozen=True, eq=False)
 class ScoreExperiment:
-    """Trial k is grasp k, for `warpjld.study.run_study`; nothing is drawn at random.
+    """Experiment for `warpjld.study.run_study` in which trial k measures grasp k; nothing is random.
 
     Attributes:
         scored: The grasps.
-        measuring: How they are measured.
-        files: SHA-256 of the files they were read from, by name.
+        measuring: Settings of the metrics.
+        files: Name and SHA-256 of the files they were read from.
         device: Warp device of the covering.
     """
 
@@ -65,16 +65,16 @@ class ScoreExperiment:
 
     @property
     def trials(self) -> int:
-        """How many grasps."""
+        """Number of grasps."""
         return len(self.scored)
 
     def identity(self) -> dict[str, Any]:
         """Hashes of all files, and settings."""
-        hands = {one.hand.name: one.hand for one in self.scored}
-        things = dict.fromkeys(one.thing for one in self.scored)
+        hands = {item.hand.name: item.hand for item in self.scored}
+        things = dict.fromkeys(item.thing for item in self.scored)
         return {
             "grasps": dict(self.files),
-            "given": [[one.hand.name, one.thing.name, one.grasp.scale, one.friction] for one in self.scored],
+            "given": [[item.hand.name, item.thing.name, item.grasp.scale, item.friction] for item in self.scored],
             "hands": [hand.identity() for hand in hands.values()],
             "objects": [thing.identity() for thing in things],
             "measuring": vars(self.measuring),
@@ -83,71 +83,74 @@ class ScoreExperiment:
         }
 
     def plan(self, trial: int) -> dict[str, Any]:
-        """What the file says."""
-        one = self.scored[trial]
-        named = {"hand": one.hand.name, "object": one.thing.name, "scale": one.grasp.scale}
-        return {"grasp": one.grasp.name, **named, "friction": one.friction}
+        """Columns that are known before the trial."""
+        scored = self.scored[trial]
+        named = {"hand": scored.hand.name, "object": scored.thing.name, "scale": scored.grasp.scale}
+        return {"grasp": scored.grasp.name, **named, "friction": scored.friction}
 
     def overall(self, rows: Sequence[dict[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         """Diversity of every hand's grasps."""
-        return {"diversity": varieties(dict.fromkeys(one.hand for one in self.scored), rows, arrays)}
+        return {"diversity": varieties(dict.fromkeys(item.hand for item in self.scored), rows, arrays)}
 
     def inputs(self) -> tuple[Path, ...]:
-        """Files of hands and objects; the grasps are read already."""
-        return tuple(dict.fromkeys(path for one in self.scored for path in (*one.hand.inputs(), *one.thing.inputs())))
+        """Files of hands and objects; the grasps have been read already."""
+        paths = (path for item in self.scored for path in (*item.hand.inputs(), *item.thing.inputs()))
+        return tuple(dict.fromkeys(paths))
 
     def moved(self, places: Mapping[Path, Path]) -> ScoreExperiment:
-        """The same grasps, these files elsewhere."""
-        moved = (replace(one, hand=one.hand.moved(places), thing=one.thing.moved(places)) for one in self.scored)
+        """Copy that reads its files from other paths."""
+        moved = (replace(item, hand=item.hand.moved(places), thing=item.thing.moved(places)) for item in self.scored)
         return replace(self, scored=tuple(moved))
 
     def begin(self) -> None:
-        """Keep Warp's remarks off the output."""
+        """Silence Warp's messages in a worker."""
         from warpjld.runtime.quiet import silence_warp
 
         silence_warp()
 
     def run(self, trial: int, rng: np.random.Generator) -> Outcome:
         """Deform the skin, and measure."""
-        one = self.scored[trial]
-        hand, thing = hand_of(one.hand), thing_of(one.thing, one.grasp.scale, self.measuring.density)
-        poses = one.grasp.poses(hand.rig.skeleton)
+        scored = self.scored[trial]
+        grasp = scored.grasp
+        hand, thing = hand_of(scored.hand), thing_of(scored.thing, grasp.scale, self.measuring.density)
+        poses = grasp.poses(hand.rig.skeleton)
         values: dict[str, Any] = {}
         if poses is None:
-            assert one.grasp.skin is not None
-            skin = one.grasp.skin
+            assert grasp.skin is not None
+            skin = grasp.skin
         else:
             skin = hand.covering.deform(poses, device=self.device, threads=1)[0]
-            wrist = one.grasp.place.to_local(poses.positions[0, [hand.rig.skeleton.index("wrist")]])[0, 0]
+            wrist = grasp.place.to_local(poses.positions[0, [hand.rig.skeleton.index("wrist")]])[0, 0]
             values |= dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
-        local = skin if _stands_still(one.grasp) else one.grasp.place.to_local(skin)[0].astype(np.float32)
-        both = closer_of(one.hand, one.thing, one.grasp.scale, self.measuring.density).both
-        measured, patches = measure_grasp(hand, thing, both, local, one.friction, self.measuring)
-        arrays = {} if one.grasp.angles is None else {f"{one.hand.name}/angles": one.grasp.angles}
+        local = skin if _at_origin(grasp) else grasp.place.to_local(skin)[0].astype(np.float32)
+        both = closer_of(scored.hand, scored.thing, grasp.scale, self.measuring.density).both
+        measured, patches = measure_grasp(hand, thing, both, local, scored.friction, self.measuring)
+        arrays = {} if grasp.angles is None else {f"{scored.hand.name}/angles": grasp.angles}
         touches = len(patches) > 0
-        return Outcome("scored" if touches else "no contact", {**values, **measured}, arrays, one.grasp.message)
+        return Outcome("scored" if touches else "no contact", {**values, **measured}, arrays, grasp.message)
 
     def check(self) -> tuple[list[str], list[str]]:
-        """Load every hand and object once: notes on them, and what looks suspicious.
+        """Load every hand and object once: notes on them, and warnings about what looks suspicious.
 
         Raises:
             InputError: One of them cannot be used.
         """
         notes, doubts = [], []
-        for hand in {one.hand for one in self.scored}:
+        for hand in {item.hand for item in self.scored}:
             rig = hand_of(hand).rig
             notes += [f"{hand.name}: {note}" for note in rig.notes]
             doubts += [f"{hand.name}: {doubt}" for doubt in rig.suspicious]
-        for thing, scale in {(one.thing, one.grasp.scale): None for one in self.scored}:
+        for thing, scale in {(item.thing, item.grasp.scale): None for item in self.scored}:
             body = thing_of(thing, scale, self.measuring.density).body
             notes += [f"{thing.name}: {note}" for note in body.report.notes()]
         return notes, doubts
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
-        """None: a grasp's pose may not be known."""
+        """Draws nothing, since the pose of a given grasp may be unknown."""
         return []
 
 
-def _stands_still(grasp: GivenGrasp) -> bool:
+def _at_origin(grasp: GivenGrasp) -> bool:
+    """Whether the object's placement is the identity."""
     place = grasp.place
     return not place.position.any() and bool((place.rotation == [[0.0, 0.0, 0.0, 1.0]]).all())

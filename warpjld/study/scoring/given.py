@@ -1,4 +1,4 @@
-"""A grasp that somebody else made: a hand's pose or skin, and the object it is beside."""
+"""A grasp to be scored: pose or skin of a hand, and placement of the object."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class GivenGrasp:
-    """One grasp to be judged, in any frame that hand and object share, with ``angles``, ``turns`` or ``skin``.
+    """A grasp to be scored, in any common frame of hand and object; it has ``angles``, ``turns`` or ``skin``.
 
     Attributes:
-        name: What its file calls it.
+        name: Its name in the file.
         thing: Name or path of the object.
         position: Displacement of the rig's root from rest [m], shape (3,).
         rotation: Rotation of the rig about its root, quaternion x, y, z, w, shape (4,).
         angles: Joint angles [rad], shape (J, 4).
         turns: Rotations of the joints relative to their parents' bones, from rest, shape (J, 4).
-        skin: The deformed skin in the rig's order [m], shape (V, 3); ``position`` and ``rotation`` then say nothing.
-        scale: Of the object.
-        place: Where the object stands.
-        friction: Coulomb coefficient; None where the file does not say.
-        mass: Of the object at its scale [kg], likewise.
-        hand: Name of the hand, likewise.
-        message: What is worth knowing.
+        skin: The deformed skin in the rig's vertex order [m], shape (V, 3); ``position`` and ``rotation`` are not used.
+        scale: Scale of the object.
+        place: Placement of the object.
+        friction: Coulomb coefficient; None if the file does not state it.
+        mass: Mass of the object at its scale [kg], likewise.
+        hand: Name of the hand; empty if the file does not state it.
+        message: Remark for the table.
     """
 
     name: str
@@ -51,7 +51,7 @@ class GivenGrasp:
     message: str = ""
 
     def poses(self, skeleton: Skeleton) -> Poses | None:
-        """The one pose; None where only the skin is known."""
+        """The hand's pose, one frame; None if only the skin is known."""
         position = self.position[None]
         if self.angles is not None:
             return poses_from_angles(
@@ -65,10 +65,10 @@ class GivenGrasp:
 
 
 def quaternion(values: Array, what: str) -> Array:
-    """A quaternion w, x, y, z of a file as a unit one x, y, z, w.
+    """Unit quaternion x, y, z, w from a file's w, x, y, z.
 
     Raises:
-        InputError: Not four finite numbers, or not of unit length to a thousandth.
+        InputError: Not four finite numbers, or a length that differs from 1 by more than 0.001.
     """
     turn = np.asarray(values, dtype=np.float64).ravel()
     length = float(np.linalg.norm(turn))

@@ -1,8 +1,8 @@
-"""Grasps of NVIDIA Isaac Sim and Isaac ROS: ``isaac_grasp`` YAML, version 1.0.
+"""Reader of grasps of NVIDIA Isaac Sim and Isaac ROS: ``isaac_grasp`` YAML, version 1.0.
 
 A file holds grasps of one gripper and one object: the gripper's pose in the object's frame [m], and named joints
-[rad]. What is ours, hand, object, scale, mass and friction, stands below ``warpjld`` where we wrote the file;
-without, the object is named by ``object_frame_link`` (Isaac ROS: ``object_frame``), the last part of its path.
+[rad]. Files that warpjld wrote also have hand, object, scale, mass and friction below the key ``warpjld``; in others
+the object is the last part of the path in ``object_frame_link`` (Isaac ROS: ``object_frame``).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ __all__ = ["read_isaac"]
 
 
 def read_isaac(path: Path, how: GraspReading) -> list[GivenGrasp]:
-    """Grasps of a file.
+    """Read the grasps of a file.
 
     Raises:
-        InputError: It is no such file, of another version, or a grasp cannot be used: names it.
+        InputError: Not such a file, another version, or a grasp that cannot be used; names the grasp.
         MissingExtraError: PyYAML is not installed.
     """
     content = _loaded(path)
@@ -67,7 +67,7 @@ def _loaded(path: Path) -> Mapping[str, Any]:
         raise MissingExtraError("reading isaac_grasp YAML", "grasps") from None
     text = read_text(path)
     with reading(path, "YAML"):
-        content = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # makes plain values only
+        content = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # creates plain values only
     if not isinstance(content, Mapping):
         raise InputError("want format: isaac_grasp", path=path)
     return content

@@ -1,4 +1,4 @@
-"""A joint map for grasps of others: which angle of the hand each of their joints is, and where their hand's frame lies.
+"""Joint map for grasps from other programs: the hand's angle for each of their joints, and their hand frame.
 
 ::
 
@@ -12,9 +12,9 @@
       "hand_frame": {"position": [0, 0, 0.01], "rotation": [1, 0, 0, 0]}
     }
 
-The hand's angle is factor × joint + offset [°]; null leaves a joint out. ``order`` names the joints of files that
-only number them. ``hand_frame`` is the pose of the rig's root joint at rest, in the axes of the rig's file, in the
-frame that the grasps call the hand's: metres, and a quaternion w, x, y, z.
+The hand's angle is factor × joint + offset [°]; null ignores a joint. ``order`` names the joints of files in which
+they are only numbered. ``hand_frame`` is the pose of the rig's root joint at rest, with the axes of the rig's file, in
+the hand frame of the grasps: metres, and a quaternion w, x, y, z.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _KEYS = ("joints", "order", "hand_frame")
 
 @dataclass(frozen=True)
 class _Angle:
-    """Angle of the hand that a joint is: factor × joint + offset [rad]."""
+    """The hand's angle for a joint: factor × joint + offset [rad]."""
 
     channel: str
     factor: float = 1.0
@@ -49,13 +49,13 @@ class _Angle:
 
 @dataclass(frozen=True, eq=False)
 class JointNames:
-    """What a joint map says; without one, joints are called as the hand's are, and frames are the same.
+    """A joint map. The default one is for files with the hand's own joint names and frame.
 
     Attributes:
-        joints: Joint of others → angle of the hand, or None for one that is left out.
-        order: Their names in the order of files that only number them.
-        position: Of the rig's root in their hand frame [m], shape (3,).
-        rotation: Of the rig's axes in it, quaternion x, y, z, w, shape (4,).
+        joints: Angle of the hand by the file's joint name; None for joints that are ignored.
+        order: Joint names, in the order of files that only number them.
+        position: Position of the rig's root in the file's hand frame [m], shape (3,).
+        rotation: Rotation of the rig's axes in that frame, quaternion x, y, z, w, shape (4,).
     """
 
     joints: Mapping[str, _Angle | None] = field(default_factory=dict)
@@ -64,10 +64,10 @@ class JointNames:
     rotation: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
 
     def named(self, values: Sequence[float], names: Sequence[str]) -> dict[str, float]:
-        """Numbered angles with their names: the file's, or those of ``order``.
+        """Values by joint name: the file's names, or those of ``order``.
 
         Raises:
-            InputError: There are no names, or not as many.
+            InputError: There are no names, or not as many as values.
         """
         called = list(names) or list(self.order)
         if not called:
@@ -82,19 +82,23 @@ class JointNames:
         return dict(zip(called, map(float, values), strict=True))
 
     def of_hand(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Angles [rad] of the hand by name, of theirs; names the map does not have stay as they are."""
+        """Angles of the hand [rad] by name, from the file's joint values; names not in the map are kept.
+
+        Raises:
+            InputError: Two joints for one angle.
+        """
         out: dict[str, float] = {}
         for name, value in values.items():
             angle = self.joints.get(name, _Angle(name))
             if angle is None:
                 continue
             if angle.channel in out:
-                raise InputError(f"joint map: two joints are {angle.channel}, '{name}' the second")
+                raise InputError(f"joint map: two joints are {angle.channel}; '{name}' is the second")
             out[angle.channel] = angle.factor * value + angle.offset
         return out
 
     def root(self, position: Array, rotation: Array) -> tuple[Array, Array]:
-        """Pose of the rig's root (3,) and (4,), of that of their hand frame."""
+        """Pose of the rig's root, (3,) [m] and (4,), from that of the file's hand frame."""
         return position + rotate(rotation, self.position), np.asarray(multiply(rotation, self.rotation))
 
 
@@ -102,7 +106,7 @@ def read_joint_names(path: str | Path) -> JointNames:
     """Read a joint map for grasps (JSON).
 
     Raises:
-        InputError: It cannot be read, or is no such map.
+        InputError: It cannot be read, or is not a joint map.
     """
     content = read_json(path)
     if not isinstance(content, dict) or not content.keys() <= set(_KEYS) or "joints" not in content:
@@ -146,7 +150,7 @@ def _frame(value: Any) -> tuple[Array, Array]:
 def _numbers(what: str, value: Any, count: int) -> Array:
     if not isinstance(value, list) or len(value) != count:
         raise InputError(f"{what}: want {count} numbers")
-    return np.array([_number(what, one) for one in value])
+    return np.array([_number(what, number) for number in value])
 
 
 def _number(what: str, value: Any) -> float:

@@ -1,9 +1,9 @@
-"""Recordings of MANO hands beside objects, as GraspXL (Zhang et al. 2024) has them: a dictionary in an ``.npy`` file.
+"""Reader of recordings of MANO hands with objects, as in GraspXL (Zhang et al. 2024): a dictionary in an ``.npy`` file.
 
-A hand, ``right_hand`` or ``left_hand``, has ``trans`` [m], ``rot`` and ``pose`` (axis-angle, fifteen joints in MANO's
-order) a frame; every other entry with ``trans`` and ``rot`` is the object, by its name. ``trans`` is taken for where
-the wrist is: MANO's own translation is that less the wrist's place in its rest hand, a part of the licensed model,
-which a field ``wrist`` [m] of the hand gives where it must be added.
+A hand, ``right_hand`` or ``left_hand``, has for every frame ``trans`` [m], ``rot`` and ``pose`` (axis-angle, fifteen
+joints in MANO's order); every other entry with ``trans`` and ``rot`` is the object, by its name. ``trans`` is read as
+the wrist's position. MANO's own translation differs from it by the wrist's position in the rest hand, which is part of
+the licensed model; a field ``wrist`` [m] of the hand is added.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ __all__ = ["is_mano_grasp", "mano_grasps"]
 Array = NDArray[np.float64]
 
 _HANDS = {"right_hand": "right", "left_hand": "left"}
-_RATE = 30.0  # of the frames, which are looked at one by one
+_RATE = 30.0  # nominal frame rate [1/s]; frames are used one by one, so it has no effect
 
 
 def is_mano_grasp(content: Any) -> bool:
-    """Whether a file's content is of this kind."""
+    """Whether a file's content is in this format."""
     return isinstance(content, Mapping) and any(isinstance(content.get(key), Mapping) for key in _HANDS)
 
 
 def mano_grasps(content: Mapping[str, Any], name: str, how: GraspReading) -> list[GivenGrasp]:
-    """The last frame of a recording, or each of them.
+    """Grasps of a recording: the last frame, or every frame.
 
     Raises:
         InputError: No hand of the rig's side, no object, frames that differ in number, or what ``mano_hands`` refuses.
     """
     rig = how.hand("")
-    side = next(one for one in ("left", "right") if f"{one}.wrist" in rig.skeleton.names)
+    side = next(name for name in ("left", "right") if f"{name}.wrist" in rig.skeleton.names)
     hand = content.get(f"{side}_hand")
     if not isinstance(hand, Mapping):
-        raise InputError(f"has no {side}_hand, which the rig is")
+        raise InputError(f"has no {side}_hand, but the rig is a {side} hand")
     things = [key for key, value in content.items() if key not in _HANDS and isinstance(value, Mapping)]
     if len(things) != 1:
         raise InputError(f"want one object beside the hand, got {', '.join(things) or 'none'}")
@@ -64,7 +64,7 @@ def mano_grasps(content: Mapping[str, Any], name: str, how: GraspReading) -> lis
         raise InputError(f"pose: want {count} frames, got {len(turns.local)}")
     quaternions = Rotation.from_rotvec(facing).as_quat()
     wanted = range(count) if how.frames == "all" else [count - 1]
-    said = f"frame {count - 1} of {count}, the last" if count > 1 and how.frames != "all" else ""
+    remark = f"frame {count - 1} of {count}, the last" if count > 1 and how.frames != "all" else ""
     return [
         GivenGrasp(
             f"{name}#{k}" if count > 1 else name,
@@ -73,7 +73,7 @@ def mano_grasps(content: Mapping[str, Any], name: str, how: GraspReading) -> lis
             turns.root[k],
             turns=turns.local[k],
             place=Places.of(where[k], quaternions[k]),
-            message=said,
+            message=remark,
         )
         for k in wanted
     ]

@@ -1,4 +1,4 @@
-"""Grasps as surfaces: the deformed skin of each, as ``study --export mesh`` writes it or others may.
+"""Reader of grasps given as deformed skins, as ``study --export mesh`` writes them.
 
 ``grasps.json`` lists them::
 
@@ -6,7 +6,7 @@
      "grasps": [{"name": "trial 0", "hand": "right", "object": "ball", "scale": 1, "friction": 0.6, "mass": 0.04,
                  "skin": "0/hand.obj"}, …]}
 
-A skin is an OBJ file in metres and the object's frame whose vertices are the rig's, in their order.
+A skin is an OBJ file in metres, in the object's frame, with the rig's vertices in the rig's order.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ LISTED = "grasps.json"
 
 
 def read_meshes(path: Path, how: GraspReading) -> list[GivenGrasp]:
-    """Grasps of a list of surfaces.
+    """Read the grasps of a list of surfaces.
 
     Raises:
-        InputError: It is no such list, or a surface is not the rig's.
+        InputError: Not such a list, or a surface that does not have the rig's topology.
     """
     content = read_json(path)
     if not isinstance(content, Mapping) or content.get("format") != FORMAT or content.get("format_version") != 1:
@@ -43,20 +43,20 @@ def read_meshes(path: Path, how: GraspReading) -> list[GivenGrasp]:
     if not isinstance(listed, list) or not listed:
         raise InputError("has no grasps", path=path)
     try:
-        return [_grasp(one, path.parent, how) for one in listed]
+        return [_grasp(entry, path.parent, how) for entry in listed]
     except InputError as error:
         raise InputError(error.message, path=error.path or path, line=error.line) from None
 
 
-def _grasp(one: Any, folder: Path, how: GraspReading) -> GivenGrasp:
-    if not isinstance(one, Mapping) or not all(isinstance(one.get(key), str) for key in ("name", "object", "skin")):
+def _grasp(entry: Any, folder: Path, how: GraspReading) -> GivenGrasp:
+    if not isinstance(entry, Mapping) or not all(isinstance(entry.get(key), str) for key in ("name", "object", "skin")):
         raise InputError("want name, object and skin of every grasp")
-    more: dict[str, Any] = {"hand": str(one.get("hand", ""))}
-    more |= {key: number_in(one[key], key, above=0.0) for key in ("scale", "friction", "mass") if key in one}
-    file = folder / one["skin"]
+    more: dict[str, Any] = {"hand": str(entry.get("hand", ""))}
+    more |= {key: number_in(entry[key], key, above=0.0) for key in ("scale", "friction", "mass") if key in entry}
+    file = folder / entry["skin"]
     if not file.resolve().is_relative_to(folder.resolve()):
-        raise InputError(f"{one['name']}: '{one['skin']}' lies outside of the folder")
-    return GivenGrasp(one["name"], one["object"], skin=_skin(file, how.hand(more["hand"])), **more)
+        raise InputError(f"{entry['name']}: '{entry['skin']}' lies outside of the folder")
+    return GivenGrasp(entry["name"], entry["object"], skin=_skin(file, how.hand(more["hand"])), **more)
 
 
 def _skin(file: Path, rig: Rig) -> Any:

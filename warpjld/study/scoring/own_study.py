@@ -1,4 +1,4 @@
-"""Grasps of a study of our own: its folder, with the table and ``poses.npz``."""
+"""Reader of the grasps of a warpjld study: its folder with the table and ``poses.npz``."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _POSE = ("angles", "root_position", "root_rotation")
 
 
 def study_tables(path: Path) -> Path | None:
-    """The table of a study in a folder, or the table itself where ``poses.npz`` lies beside it; else None."""
+    """Table of the study in a folder, or the given table, if ``poses.npz`` is in the same folder; else None."""
     tables = [path / name for name in _TABLES] if path.is_dir() else [path] if path.name in _TABLES else []
     return next((table for table in tables if table.is_file() and (table.parent / "poses.npz").is_file()), None)
 
 
 def read_own_study(table: Path, how: GraspReading) -> list[GivenGrasp]:
-    """Grasps of the trials that have a pose, in their order.
+    """Grasps of the trials that have a pose, in order.
 
     Raises:
         InputError: Damaged files, poses of another skeleton, or none.
@@ -81,13 +81,13 @@ def _rows(table: Path) -> list[dict[str, Any]]:
         with reading(table, "CSV"):
             rows = list(csv.DictReader(StringIO(text)))
     if rows and (missing := [key for key in ("trial", "object", "scale", "friction", "mass") if key not in rows[0]]):
-        raise InputError(f"is no table of a grasp study: it has no column {', '.join(missing)}", path=table)
+        raise InputError(f"is not the table of a grasp study: it has no column {', '.join(missing)}", path=table)
     return rows
 
 
 def _array(arrays: dict[str, NDArray[Any]], name: str, path: Path) -> NDArray[Any]:
     if name not in arrays:
-        raise InputError(f"has no '{name}': no poses of a grasp study", path=path)
+        raise InputError(f"has no '{name}': these are not the poses of a grasp study", path=path)
     if not np.isfinite(arrays[name]).all():
         raise InputError(f"'{name}' holds numbers that are not finite", path=path)
     return arrays[name]

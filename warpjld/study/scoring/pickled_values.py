@@ -1,11 +1,10 @@
-"""Arrays, numbers, texts, lists and dictionaries out of a pickle that is never executed.
+"""Safe reading of pickles: arrays, numbers, texts, lists and dictionaries, without executing the pickle.
 
-NumPy keeps a dictionary in an ``.npy`` file as a pickle, and unpickling runs whatever the file asks for. Here no
-pickle machinery runs at all: the standard library's `pickletools` splits the bytes into opcodes, and this file has a
-meaning for those that make plain values. What a pickle wants to call is compared with a short list of names of
-NumPy's, and what NumPy would make of it is made here from the bytes; nothing is ever imported or called by a name in
-the file. A restricted unpickler, which would be shorter, still calls NumPy's constructors with arguments of the
-file's choice.
+NumPy stores a dictionary in an ``.npy`` file as a pickle, and unpickling executes whatever the file says. Here Python's
+unpickler is not used: the standard library's `pickletools` splits the bytes into opcodes, and this module interprets
+those that create plain values. Names that a pickle would call are compared with a short list of NumPy's names, and the
+result of such a call is created here from the bytes; nothing is imported or called by a name from the file. A
+restricted unpickler would be shorter, but would still call NumPy's constructors with arguments chosen by the file.
 """
 
 from __future__ import annotations
@@ -46,14 +45,14 @@ _NOTHING = {"PROTO", "FRAME", "STOP"}
 
 @dataclass(frozen=True)
 class _Name:
-    """What a pickle calls something of Python's."""
+    """A Python name in a pickle."""
 
     text: str
 
 
 @dataclass
 class _Type:
-    """A NumPy type under way."""
+    """A NumPy dtype under construction."""
 
     text: str
     order: str = ""
@@ -64,7 +63,7 @@ class _Type:
 
 @dataclass
 class _Array:
-    """A NumPy array under way: of numbers, or the list of an array of objects."""
+    """A NumPy array under construction: its numbers, or the list of an array of objects."""
 
     value: Any = None
 
@@ -74,13 +73,17 @@ _MARK = object()
 
 @dataclass
 class _Machine:
-    """A pickle's stack and memory."""
+    """Interpreter of pickle opcodes, with the stack and the memo."""
 
     stack: list[Any] = field(default_factory=list)
     memory: dict[int, Any] = field(default_factory=dict)
 
     def do(self, code: str, argument: Any) -> None:
-        """One opcode; an unknown one raises InputError."""
+        """Execute one opcode.
+
+        Raises:
+            InputError: An opcode that plain values do not need.
+        """
         stack = self.stack
         if code in _NOTHING:
             return
@@ -148,10 +151,10 @@ class _Machine:
 
 
 def read_object_array(path: str | Path) -> Any:
-    """What an ``.npy`` file holds: an array, or of an array of Python objects the plain values, an only one by itself.
+    """Content of an ``.npy`` file: an array, or the plain values in an array of Python objects (see below).
 
     Raises:
-        InputError: It is no such file, or wants to make anything but arrays, numbers, texts, lists and dictionaries.
+        InputError: Not such a file, or content other than arrays, numbers, texts, lists and dictionaries.
     """
     data = BytesIO(read_bytes(path))
     with reading(path, "a NumPy file (.npy)"):
@@ -165,10 +168,10 @@ def read_object_array(path: str | Path) -> Any:
 
 
 def values_of_pickle(data: bytes) -> Any:
-    """Plain values of a pickle; an array of one object is that object.
+    """Plain values in a pickle; an array with a single object is returned as that object.
 
     Raises:
-        InputError: It makes something else, or is damaged.
+        InputError: It contains something else, or is damaged.
     """
     machine = _Machine()
     for code, argument, _ in pickletools.genops(data):
@@ -187,7 +190,7 @@ def _name(text: str) -> _Name:
 
 
 def _made(name: str, arguments: tuple[Any, ...]) -> Any:
-    """What a call would make, without calling."""
+    """Result of a call in the pickle, created without calling it."""
     if name in _ARRAY:
         return _Array()
     if name == "numpy.dtype":
@@ -243,7 +246,7 @@ def _of(value: Any, kind: type) -> Any:
 
 
 def _plain(value: Any, seen: dict[int, Any]) -> Any:
-    """The value with finished arrays in place of those under way; what is there twice is gone through once."""
+    """The value with arrays under construction replaced by finished ones; shared values are visited once."""
     if isinstance(value, _Array):
         return _plain(value.value, seen)
     if isinstance(value, _Name | _Type) or value is _MARK:
@@ -254,7 +257,7 @@ def _plain(value: Any, seen: dict[int, Any]) -> Any:
         made: Any = {} if isinstance(value, dict) else []
         seen[id(value)] = made
         if isinstance(value, dict):
-            made.update((key, _plain(one, seen)) for key, one in value.items())
+            made.update((key, _plain(item, seen)) for key, item in value.items())
         else:
-            made.extend(_plain(one, seen) for one in value)
+            made.extend(_plain(item, seen) for item in value)
     return seen[id(value)]

@@ -1,4 +1,4 @@
-"""Files of grasps, by their kind."""
+"""Reading files of grasps; the format is chosen by suffix and content."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _READ = (".npy", ".yaml", ".yml", ".csv", ".json")
 
 
 def read_grasps(path: Path, how: GraspReading) -> list[GivenGrasp]:
-    """Grasps of a file, or of all files in a folder and those below it, in the order of their names.
+    """Grasps of a file, or of all files in a folder and its subfolders, in the order of their names.
 
     Raises:
-        InputError: There are none, or one cannot be used: names the file.
+        InputError: There are none, or one cannot be used; names the file.
     """
     table = study_tables(path)
     if table is not None:
@@ -46,7 +46,7 @@ def grasp_files(path: Path) -> list[Path]:
     if not path.is_dir():
         if path.exists() and path.suffix.lower() not in _READ:
             raise InputError(
-                f"'{path.suffix}' is no kind of file of grasps that is read: {', '.join(_READ)}", path=path
+                f"grasps are not read from '{path.suffix}' files; want one of {', '.join(_READ)}", path=path
             )
         return [path]
     listed = sorted(path.rglob(LISTED))

@@ -1,4 +1,4 @@
-"""What readers of grasps need to know besides the file."""
+"""Settings of the readers of grasps, and what they share: making a grasp from named angles, reading numbers."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class GraspReading:
-    """How grasps of others are read.
+    """Settings for reading grasps of other programs.
 
     Attributes:
-        hand: The rig of a hand by its name; "" for a file that names none.
-        names: Which angle of the hand each of their joints is.
-        flat_hand_mean: Whether no rotation means the flat hand, for MANO poses; None where the file must say.
-        frames: Of recordings, whether the last frame is the grasp, or each of them.
+        hand: Function that gives the rig of a hand by its name, "" where a file names none.
+        names: Joint map.
+        flat_hand_mean: For MANO poses, whether zero rotations mean the flat hand; None: the file must state it.
+        frames: For recordings, whether the ``last`` frame or ``all`` frames are grasps.
     """
 
     hand: Callable[[str], Rig]
@@ -39,18 +39,18 @@ class GraspReading:
     def posed(
         self, name: str, thing: str, position: Array, rotation: Array, joints: Mapping[str, float], **more: Any
     ) -> GivenGrasp:
-        """A grasp of a hand's pose and named angles.
+        """Make a grasp from a pose of the hand frame and joint values by name.
 
         Args:
-            name: What the file calls it.
-            thing: The object.
-            position: Of the file's frame of the hand [m], shape (3,).
-            rotation: Likewise, quaternion x, y, z, w.
-            joints: Angle of each joint [rad].
+            name: Name of the grasp.
+            thing: Name or path of the object.
+            position: Position of the file's hand frame [m], shape (3,).
+            rotation: Its rotation, quaternion x, y, z, w.
+            joints: Joint values [rad] by the file's names.
             more: Other fields of `GivenGrasp`.
 
         Raises:
-            InputError: Joints that are none of the hand's, or numbers that are none.
+            InputError: Unknown joints, or numbers that are not finite.
         """
         skeleton = self.hand(more.get("hand", "")).skeleton
         try:
@@ -61,15 +61,15 @@ class GraspReading:
             raise InputError(f"{name}: the hand's position is not three finite numbers")
         at, turn = self.names.root(position, rotation)
         beyond = beyond_limits(skeleton, angles)
-        said = f"{beyond} angles more than 1° beyond their limits" if beyond else ""
-        return GivenGrasp(name, thing, at - skeleton.rest[0], turn, angles=angles, message=said, **more)
+        remark = f"{beyond} angles more than 1° beyond their limits" if beyond else ""
+        return GivenGrasp(name, thing, at - skeleton.rest[0], turn, angles=angles, message=remark, **more)
 
 
 def number_in(value: Any, what: str, *, above: float | None = None) -> float:
-    """A finite number of a file, which may write it as text as YAML does with 1e-5.
+    """A finite number from a file, also where it was read as text (YAML reads 1e-5 as text).
 
     Raises:
-        InputError: It is none, or not above the bound.
+        InputError: Not a finite number, or not above the bound.
     """
     try:
         found = float(value) if not isinstance(value, bool) else float("nan")

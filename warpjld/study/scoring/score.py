@@ -1,4 +1,4 @@
-"""Judging grasps of others: what is given on the command line becomes an experiment."""
+"""Scoring of given grasps: builds the experiment from files and options, and runs it."""
 
 from __future__ import annotations
 
@@ -38,29 +38,29 @@ def given_scores(
     flat_hand_mean: bool | None = None,
     frames: Literal["last", "all"] = "last",
 ) -> ScoreExperiment:
-    """The experiment that judges grasps of a file or folder.
+    """Experiment that scores the grasps of a file or folder.
 
     Args:
-        grasps: A study's folder, or grasps of others; see ``docs/how-to/score.md``.
-        hand: Whose grasps they are; with ``objects``, instead of ``plan``.
-        objects: Folder of surfaces, each in the frame that the grasps are given in.
-        plan: A study file whose hands, objects and measuring are taken.
-        joint_map: What joints of others are, see `warpjld.study.scoring.joint_names`.
-        friction: Coulomb coefficient where a grasp brings none.
-        unit: Of the surfaces in ``objects``.
-        measuring: How; that of the plan, or the defaults.
+        grasps: A study's folder, or grasps of another program; see ``docs/how-to/score.md``.
+        hand: The hand; together with ``objects``, instead of ``plan``.
+        objects: Folder of surfaces, each in the frame that the grasps refer to.
+        plan: A study file whose hands, objects and measuring are used.
+        joint_map: Joint map, see `warpjld.study.scoring.joint_names`.
+        friction: Coulomb coefficient for grasps without one.
+        unit: Unit of the surfaces in ``objects``.
+        measuring: Settings of the metrics; by default those of the plan, or the general defaults.
         device: Warp device of the covering.
-        flat_hand_mean: Whether no rotation of a MANO pose means the flat hand; None where the file says it.
-        frames: Of recordings, whether the last frame is a grasp or all are.
+        flat_hand_mean: Whether zero rotations of a MANO pose mean the flat hand; None if the file states it.
+        frames: For recordings, whether the last frame is the grasp, or all frames are.
 
     Raises:
-        InputError: Something of this cannot be used.
+        InputError: One of these cannot be used.
     """
     check_friction(friction)
     if plan is None and (hand is None or objects is None):
         raise InputError("want a hand and a folder of objects, or a study's plan that has both")
     if plan is not None and (hand is not None or objects is not None):
-        raise InputError("a study's plan says which hands and objects there are: give none beside it")
+        raise InputError("a study's plan already names hands and objects: give either a plan, or a hand and objects")
     path = Path(grasps)
     if not path.exists():
         raise InputError("no such file", path=path)
@@ -71,8 +71,8 @@ def given_scores(
     hands.check(found)
     things = _of_plan(planned) if planned else _of_folder(ObjectFolder(Path(objects or ".")), unit)
     scored = tuple(
-        Scored(one, hands.find(one.hand), things(one), friction if one.friction is None else one.friction)
-        for one in found
+        Scored(grasp, hands.find(grasp.hand), things(grasp), friction if grasp.friction is None else grasp.friction)
+        for grasp in found
     )
     files = [*grasp_files(path), *([Path(joint_map)] if joint_map else [])]
     hashes = tuple(
@@ -98,18 +98,18 @@ def score_grasps(
     allow_mixed: bool = False,
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> StudyResult:
-    """Judge grasps of others by the columns of a grasp study, on skin that deforms.
+    """Score grasps of other programs on deformed skin, with the columns of a grasp study.
 
     Args:
         grasps: A study's folder, isaac_grasp YAML, DexGraspBench or GraspXL ``.npy``, CSV of joint angles, surfaces.
-        out: Folder of the table.
+        out: Output folder.
         hand: Rig file of the hand, or ``builtin:left`` or ``builtin:right``.
-        objects: Folder of surfaces in metres, each in the frame that the grasps are given in.
-        plan: A study file instead of both.
-        joint_map: JSON that says which angle of the hand each joint is, where names differ.
-        friction: Coulomb coefficient where a grasp brings none.
-        flat_hand_mean: Whether no rotation of a MANO pose means the flat hand; None where the file says it.
-        processes: As of ``Study.run``, likewise ``table``, ``fresh``, ``ray``, ``allow_mixed`` and ``report``.
+        objects: Folder of surfaces in metres, each in the frame that the grasps refer to.
+        plan: A study file, instead of ``hand`` and ``objects``.
+        joint_map: JSON file that maps joints of other names to angles of the hand.
+        friction: Coulomb coefficient for grasps without one.
+        flat_hand_mean: Whether zero rotations of a MANO pose mean the flat hand; None if the file states it.
+        processes: As for ``Study.run``, likewise ``table``, ``fresh``, ``ray``, ``allow_mixed`` and ``report``.
 
     Raises:
         InputError: Grasps, hand or objects cannot be used; names the file.
@@ -147,15 +147,15 @@ def score_grasps(
 
 
 def hand_choice(text: str) -> HandChoice:
-    """A hand as the command line names rigs: a file, ``builtin:left`` or ``builtin:right``.
+    """A hand by its name on the command line: a file, ``builtin:left`` or ``builtin:right``.
 
     Raises:
-        InputError: Nothing built in is called so, or there is no such file.
+        InputError: There is no such built-in hand, or no such file.
     """
     kind, colon, which = text.partition(":")
     if kind == "builtin" and colon:
         if which not in ("left", "right"):
-            raise InputError(f"no hand that is built in is called '{which}': want builtin:left or builtin:right")
+            raise InputError(f"there is no built-in hand '{which}': want builtin:left or builtin:right")
         return HandChoice(which, side=which)
     path = Path(text)
     if not path.is_file():
@@ -164,7 +164,7 @@ def hand_choice(text: str) -> HandChoice:
 
 
 class _Hands:
-    """The hands there are, by the names that grasps have for them."""
+    """The hands, by name; a single hand is used whatever name a grasp states."""
 
     def __init__(self, choices: tuple[HandChoice, ...]) -> None:
         self._choices = {choice.name: choice for choice in choices}
@@ -180,29 +180,30 @@ class _Hands:
         return hand_of(self.find(name)).rig
 
     def check(self, grasps: list[GivenGrasp]) -> None:
-        named = {one.hand for one in grasps} - {""}
+        """Refuse grasps of several hands when only one hand is given."""
+        named = {grasp.hand for grasp in grasps} - {""}
         if len(named) > 1 and len(self._choices) == 1:
-            raise InputError(f"these are grasps of {', '.join(sorted(named))}: one hand is not all of them")
+            raise InputError(f"these are grasps of several hands, {', '.join(sorted(named))}, but one hand is given")
 
 
 def _of_plan(plan: GraspPlan) -> Callable[[GivenGrasp], ObjectChoice]:
     known = {thing.name: thing for thing in plan.objects}
 
-    def find(one: GivenGrasp) -> ObjectChoice:
-        thing = known.get(one.thing) or known.get(PurePosixPath(one.thing).stem)
+    def find(grasp: GivenGrasp) -> ObjectChoice:
+        thing = known.get(grasp.thing) or known.get(PurePosixPath(grasp.thing).stem)
         if thing is None:
-            raise InputError(f"{one.name}: no object '{one.thing}' in the plan; there are {', '.join(known)}")
+            raise InputError(f"{grasp.name}: no object '{grasp.thing}' in the plan; there are {', '.join(known)}")
         return thing
 
     return find
 
 
 def _of_folder(folder: ObjectFolder, unit: str) -> Callable[[GivenGrasp], ObjectChoice]:
-    def find(one: GivenGrasp) -> ObjectChoice:
-        file = folder.find(one.thing)
-        name = PurePosixPath(one.thing.replace("\\", "/"))
+    def find(grasp: GivenGrasp) -> ObjectChoice:
+        file = folder.find(grasp.thing)
+        name = PurePosixPath(grasp.thing.replace("\\", "/"))
         called = name.stem if name.suffix.lower() == file.suffix.lower() else name.name
-        mass = None if one.mass is None else one.mass / one.scale**3
+        mass = None if grasp.mass is None else grasp.mass / grasp.scale**3
         return ObjectChoice(called, file=file, unit=unit, centre=False, mass=mass)
 
     return find

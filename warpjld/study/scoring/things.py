@@ -1,4 +1,4 @@
-"""Which surface file in a folder of objects a grasp means."""
+"""Finding the surface file of a grasp's object in a folder."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ __all__ = ["ObjectFolder"]
 
 _SURFACES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 _CHOSEN = ("simplified", "mesh", "model", "textured", "decomposed")
-"""File names that collections give the one surface of an object's folder, in the order they are taken."""
+"""Common names of the main surface in an object's folder, in order of preference."""
 
 _DEEP = 2
-"""Parts of its path in there: ``mesh/simplified.obj``."""
+"""Largest depth of that surface in the folder, in parts of its path: ``mesh/simplified.obj``."""
 
 
 class ObjectFolder:
-    """A folder of objects: files, ``ball.obj``, or folders of them, ``ball/mesh/simplified.obj``.
+    """A folder of objects: files such as ``ball.obj``, or folders such as ``ball/mesh/simplified.obj``.
 
     Args:
         folder: The folder.
@@ -40,10 +40,10 @@ class ObjectFolder:
                 self._by_name[name].append(file)
 
     def find(self, wanted: str) -> Path:
-        """The surface of a name or path, whose last parts count: what lies nearest to what was asked for.
+        """Surface file for a name or path; of a path the longest trailing part that exists in this folder is used.
 
         Raises:
-            InputError: There is none, or several would do: names them.
+            InputError: There is none, or several match; names them.
         """
         parts = PurePosixPath(wanted.replace("\\", "/")).parts
         for k in range(len(parts)):
@@ -64,7 +64,7 @@ class ObjectFolder:
         raise InputError(f"no object '{wanted}' in {self._folder}{did_you_mean(wanted, known)}")
 
     def _only(self, found: list[Path], wanted: str, below: Path | None) -> Path:
-        """The one of several that an object's folder is known by; deeper down lie other objects' folders."""
+        """The main surface among several files of an object; files deeper than ``_DEEP`` belong to other objects."""
         near = [file for file in found if below is None or len(file.relative_to(below).parts) <= _DEEP]
         for name in (PurePosixPath(wanted).stem, *_CHOSEN):
             chosen = [file for file in near if file.stem == name]

@@ -1,4 +1,4 @@
-"""A study's grasps for other programs: named joints, poses, surfaces in contact."""
+"""Export of a study's grasps for other programs: named joints and poses, or surfaces with contact maps."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from warpjld.study.shards import Shards
 __all__ = ["KINDS", "export_grasps"]
 
 KINDS = ("isaac", "dexgraspbench", "mesh")
+"""Names of the export formats."""
 
 
 def export_grasps(
     plan: GraspPlan, shards: Shards, folder: Path, kinds: Sequence[str], trials: Sequence[int] | None = None
 ) -> list[Path]:
-    """Write the closed hands of a study, and the objects they are beside, each kind in a folder of its own.
+    """Write the closed hands of a study and its objects, each format into a folder of its own.
 
     Args:
-        plan: The study's.
+        plan: The study's plan.
         shards: Its trials.
-        folder: Where to.
-        kinds: Some of ``KINDS``.
+        folder: Output folder.
+        kinds: Formats, of ``KINDS``.
         trials: Numbers of trials; None for all that closed.
 
     Raises:

@@ -1,4 +1,4 @@
-"""A study's grasps as DexGraspBench has them: a dictionary in an ``.npy`` file each, ``header.json`` beside them."""
+"""Export in the format of DexGraspBench: one dictionary per ``.npy`` file, and ``header.json`` that explains them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["write_dexgraspbench"]
 
 
 def write_dexgraspbench(trials: Sequence[ClosedTrial], folder: Path) -> list[Path]:
-    """Write a file a grasp, by hand and object; NumPy keeps dictionaries as pickles, so readers must allow these."""
+    """Write one file per grasp, in folders by hand and object; dictionaries are pickles, which readers must allow."""
     folder.mkdir(parents=True, exist_ok=True)
     header = folder / "header.json"
     write_json(header, _header(trials))

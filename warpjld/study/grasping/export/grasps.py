@@ -1,4 +1,4 @@
-"""What of a study's trials goes out: closed hands with their poses, and the files of objects they are beside."""
+"""Closed trials of a study with their poses, and OBJ files of the study's objects, for all export formats."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class ClosedTrial:
 
     Attributes:
         trial: Its number.
-        hand: Which hand.
-        thing: What it is beside, likewise.
-        scale: Of the object.
+        hand: The hand.
+        thing: The object.
+        scale: Scale of the object.
         row: Its row of the table.
         angles: Joint angles [rad], shape (J, 4).
-        displacement: Of the root joint from rest [m], shape (3,).
-        rotation: Of the rig about it, quaternion x, y, z, w, shape (4,).
+        displacement: Displacement of the root joint from rest [m], shape (3,).
+        rotation: Rotation of the rig about the root joint, quaternion x, y, z, w, shape (4,).
     """
 
     trial: int
@@ -49,12 +49,12 @@ class ClosedTrial:
 
     @property
     def name(self) -> str:
-        """What files call it."""
+        """Name of the grasp in files."""
         return f"grasp_{self.trial}"
 
     @property
     def position(self) -> Array:
-        """Of the rig's root joint in the object's frame [m], shape (3,)."""
+        """Position of the rig's root joint in the object's frame [m], shape (3,)."""
         return np.asarray(hand_of(self.hand).rig.skeleton.rest[0] + self.displacement)
 
     @property
@@ -64,10 +64,10 @@ class ClosedTrial:
 
 
 def closed_trials(plan: GraspPlan, shards: Shards, wanted: Sequence[int] | None = None) -> list[ClosedTrial]:
-    """Trials that have a pose, in their order.
+    """Trials that have a pose, in order.
 
     Args:
-        plan: The study's.
+        plan: The study's plan.
         shards: Its trials.
         wanted: Numbers of trials; None for all that closed.
 
@@ -91,15 +91,15 @@ def closed_trials(plan: GraspPlan, shards: Shards, wanted: Sequence[int] | None 
 
 
 def exported_posture(trial: ClosedTrial, among: Sequence[ClosedTrial]) -> dict[str, float]:
-    """Angles by name [rad]: of joints with room to move, and those that are not as at rest in some of the trials."""
+    """Angles [rad] by name, of channels that can move or that differ from rest in any of the trials ``among``."""
     skeleton = hand_of(trial.hand).rig.skeleton
-    chosen = free_channels(skeleton, np.stack([one.angles for one in among if one.hand == trial.hand]))
+    chosen = free_channels(skeleton, np.stack([other.angles for other in among if other.hand == trial.hand]))
     names = channel_names(skeleton, chosen)
     return dict(zip(names, (float(value) for value in trial.angles[chosen]), strict=True))
 
 
 def write_objects(trials: Sequence[ClosedTrial], density: float, folder: Path) -> list[Path]:
-    """Surfaces of the objects at scale 1, in the frame of the study, as OBJ files by name."""
+    """Write the objects' surfaces at scale 1, in the frame of the study, as OBJ files."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for thing in dict.fromkeys(trial.thing for trial in trials):
@@ -113,7 +113,7 @@ def write_objects(trials: Sequence[ClosedTrial], density: float, folder: Path) -
 
 
 def write_obj(path: Path, vertices: NDArray[np.floating], faces: NDArray[np.integer], about: str) -> None:
-    """A surface with every digit of its coordinates."""
+    """Write a surface as OBJ with coordinates to full float64 precision."""
     lines = [f"# {about}"]
     lines += ["v " + " ".join(repr(float(value)) for value in row) for row in vertices]
     lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]

@@ -1,6 +1,6 @@
-"""A study's grasps as ``isaac_grasp`` YAML 1.0: one file for each hand, object and scale.
+"""Export as ``isaac_grasp`` YAML 1.0: one file for each hand, object and scale.
 
-Written here line by line, each number with all its digits; what other programs do not know stands below ``warpjld``.
+Written line by line, with numbers to full precision; fields outside the format are below the key ``warpjld``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["write_isaac"]
 
 
 def write_isaac(trials: Sequence[ClosedTrial], folder: Path) -> list[Path]:
-    """Write the files; their names are those of hand, object and scale."""
+    """Write the files, named after hand, object and scale."""
     folder.mkdir(parents=True, exist_ok=True)
     groups: dict[Path, list[ClosedTrial]] = {}
     for trial in trials:
@@ -74,7 +74,7 @@ def _grasp(trial: ClosedTrial, group: Sequence[ClosedTrial]) -> list[str]:
 
 
 def _number(value: float) -> str:
-    """All digits; YAML 1.1 takes 1e-05 for a text, 1.0e-05 for a number."""
+    """Number to full precision; YAML 1.1 reads 1e-05 as text, 1.0e-05 as a number."""
     mantissa, e, exponent = repr(float(value)).partition("e")
     return mantissa + ("" if "." in mantissa or not e else ".0") + e + exponent
 

@@ -1,7 +1,7 @@
-"""A study's grasps as surfaces: hand and object in contact, and maps of contact on both.
+"""Export as surfaces: hand and object in contact, with contact maps of both.
 
-A folder a trial: ``hand.obj`` and ``object.obj`` with every digit, vertices in the rig's and the object's order;
-``grasp.glb`` with both, coloured by the hand's parts in contact; ``contact.npz``. ``grasps.json`` lists them.
+One folder per trial: ``hand.obj`` and ``object.obj`` to full precision, vertices in the rig's and the object's order;
+``grasp.glb`` with both, coloured by the hand's parts in contact; ``contact.npz``. ``grasps.json`` lists the trials.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Digits that close do not pass through one another or the palm."""
+"""Separation of closing digits: no digit passes through another or through the palm."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from warpjld.grasp.posed_skins import PosedSkins
 
 __all__ = ["keep_apart"]
 
-_WAY = np.array([0.35, 0.7, 1.0])  # parts of the way at which crossings are looked for
-_HALVINGS = 6
+_WAY = np.array([0.35, 0.7, 1.0])  # fractions of the closing motion at which crossings are looked for
+_HALVINGS = 6  # bisection steps: the motion is limited to within 1/64
 
 
 def keep_apart(
@@ -22,21 +22,21 @@ def keep_apart(
     closed: NDArray[np.float64],
     chains: Mapping[str, tuple[int, ...]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Close all digits of G hands at once, each only as far as its skin crosses no other digit's and not the palm's.
+    """Close all digits of G hands together, each only as far as its skin crosses neither another digit nor the palm.
 
-    Triangles of different parts are tested for crossing at the end of the way and at places on it. Of two digits that
-    cross one is stopped where it is clear of all others: a thumb rather than a finger, since thumbs close last. What
-    crosses already at the start does not count.
+    Intersections of triangles of different parts are counted at three fractions of the closing motion. Of two digits
+    that cross, one is stopped where it is clear of all others: the thumb rather than a finger, and else the later one
+    in the order of ``chains``. Crossings of the open hand do not count.
 
     Args:
-        skin: The hand's.
-        deformed: Skins of some of the hands (n,) with joint angles (n, J, 4) [m], shape (n, V, 3).
-        start: Angles of the open hands, shape (G, J, 4).
-        closed: Angles wanted, shape (G, J, 4).
+        skin: The hand's skin.
+        deformed: Function from hands (n,) and joint angles (n, J, 4) to skins [m], shape (n, V, 3).
+        start: Angles of the open hands [rad], shape (G, J, 4).
+        closed: Wanted angles [rad], shape (G, J, 4).
         chains: Joints of D digits, see ``digit_chains``.
 
     Returns:
-        Angles, shape (G, J, 4), and the part of their way that digits went, shape (G, D).
+        Angles [rad], shape (G, J, 4), and the fraction of the closing motion of every digit, shape (G, D).
     """
     names = skin.parts.names
     digits = np.array([d for d, digit in enumerate(chains) if digit in names], dtype=np.int64)
@@ -65,17 +65,17 @@ def keep_apart(
         now = skin.crossings(skins(rows, way, gone[rows])).reshape(len(going), len(_WAY), len(names), len(names))
         worse = np.asarray((now > before[going][:, None]).any(axis=3))[:, :, label]
         crossing = np.asarray(worse.any(axis=1))
-        some = np.asarray(crossing.any(axis=1))
-        going, worse, crossing = going[some], worse[some], crossing[some]
+        affected = np.asarray(crossing.any(axis=1))
+        going, worse, crossing = going[affected], worse[affected], crossing[affected]
         if not len(going):
             break
         last = len(order) - 1 - crossing[:, ::-1].argmax(axis=1)
         digit, own = order[last], label[last]
-        there = worse[np.arange(len(going)), :, last]  # at which places the digit crosses if it goes as far as wanted
+        there = worse[np.arange(len(going)), :, last]  # fractions at which the digit crosses if it is not stopped
         low, high = np.zeros(len(going)), gone[going, digit]
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            # at places that the digit still comes to nothing changes
+            # fractions that the digit reaches before it is stopped need no new test
             passed = middle[:, None] >= _WAY
             crosses = (there & passed).any(axis=1)
             asked, place = np.nonzero(~passed & ~crosses[:, None])

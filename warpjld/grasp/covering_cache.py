@@ -1,4 +1,4 @@
-"""What is made of a hand once, and kept as long as the hand is."""
+"""Cache of values derived from a covering, with the covering's lifetime."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def kept_with(covering: Covering, make: Callable[[Covering], T]) -> T:
-    """``make(covering)``, the same every time it is asked for."""
+    """Value of ``make(covering)``, computed at the first call and cached on the covering."""
     kept: dict[Callable[[Covering], T], T] = vars(covering).setdefault("_made_of", {})
     if make not in kept:
         kept[make] = make(covering)

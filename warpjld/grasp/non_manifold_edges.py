@@ -1,4 +1,4 @@
-"""Edges of more than two triangles: which of these belong together, and pieces that have no vertex in common."""
+"""Non-manifold edges: pairing of the triangles around them, and separation of a surface into pieces there."""
 
 from __future__ import annotations
 
@@ -10,34 +10,37 @@ from warpjld.grasp.edges import edges_of_sides
 
 __all__ = ["pairs_round_edge", "separate_pieces", "turned_patches"]
 
-_SAME = 1e-6  # angle about an edge below which triangles lie on one another [rad]
-_STEP = 1e-4  # off a triangle to either side, as a part of the root of twice its area
-_RAY = np.array([0.48, 0.64, 0.6])  # the direction of a unit vector along which nobody builds
+_SAME = 1e-6  # dihedral angle below which two triangles coincide [rad]
+_STEP = 1e-4  # offset of a ray's origin from a triangle, relative to the square root of twice the triangle's area
+_RAY = np.array([0.48, 0.64, 0.6])  # unit ray direction, unlikely to be parallel to modelled faces
 
 
 def pairs_round_edge(
     low: NDArray[np.float64], high: NDArray[np.float64], opposite: NDArray[np.float64], forward: NDArray[np.bool_]
 ) -> list[tuple[int, int]]:
-    """Pairs of the triangles round one edge that enclose a part of a solid between them.
+    """Pair the triangles around an edge so that each pair bounds one wedge of a solid.
 
-    Gone round about the edge anticlockwise, a triangle that runs along it from ``low`` to ``high`` has the solid before
-    it, the others behind; every one of the first kind takes the nearest of the second that is still free. Triangles
-    that are left over, as where a wall stands inside, are in no pair.
+    Triangles are sorted by angle about the edge, anticlockwise. One that traverses the edge from ``low`` to ``high``
+    ends a wedge of the solid, the others begin one; each end is paired with the nearest beginning before it that is
+    still free. Triangles left over, such as an internal wall, are in no pair.
 
     Args:
         low: One end of the edge, shape (3,); likewise ``high``.
         opposite: The corner of each of n triangles that is not on the edge, shape (n, 3).
-        forward: Whether they run from ``low`` to ``high``, shape (n,).
+        forward: Whether each traverses the edge from ``low`` to ``high``, shape (n,).
+
+    Returns:
+        Pairs of rows, the triangle that begins a wedge first.
     """
     axis = unit(high - low)
     across = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin()]))
     away = opposite - low
     angle = np.arctan2(away @ np.cross(axis, across), away @ across)
-    # of triangles that lie on one another, those that end a solid come first
+    # of triangles that coincide, those that end a wedge come first
     order = np.lexsort([~forward, np.round(angle / _SAME)])
     pairs: list[tuple[int, int]] = []
     begun: list[int] = []
-    for n in [*order, *order]:  # twice round: a solid may begin before the first
+    for n in [*order, *order]:  # twice round: a wedge may begin before the first triangle
         n = int(n)
         if any(n in pair for pair in pairs):
             continue
@@ -52,7 +55,7 @@ def pairs_round_edge(
 def separate_pieces(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], piece: NDArray[np.int32]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int64]]:
-    """Vertices that several pieces have in common, once for each of them.
+    """Duplicate vertices that several pieces share, so that every piece has its own.
 
     Args:
         vertices: Shape (V, 3).
@@ -60,7 +63,7 @@ def separate_pieces(
         piece: Piece of every triangle, shape (T,).
 
     Returns:
-        Vertices, faces, and the vertex before of every vertex.
+        Vertices, faces, and the original index of every vertex.
     """
     rows = np.stack([np.repeat(piece, 3).astype(np.int64), faces.ravel().astype(np.int64)], axis=1)
     own, place = np.unique(rows, axis=0, return_inverse=True)
@@ -70,11 +73,20 @@ def separate_pieces(
 def turned_patches(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], patch: NDArray[np.int32]
 ) -> NDArray[np.bool_]:
-    """Patches between crowded edges that look into the solid they bound, shape (patches,).
+    """Find patches (bounded by non-manifold edges) whose normals point into the solid they bound.
 
-    On which side of a patch the solid is says the number of surfaces that a ray meets, whichever way these look. Where
-    it is on both, as of two lids that lie on one another, a patch is turned if its edges then fit their neighbours
-    better: as many triangles run along an edge in the one direction as in the other.
+    The side of the solid is found by ray parity (number of triangles a ray from either side of the patch crosses),
+    which does not depend on orientation. Where parity says solid on both sides or on neither, as between two coinciding
+    lids, a patch is flipped if this balances its edges better: every edge should be traversed equally often in both
+    directions.
+
+    Args:
+        vertices: Shape (V, 3).
+        faces: Triangles, shape (T, 3).
+        patch: Patch of every triangle, shape (T,).
+
+    Returns:
+        Mask of the patches to flip, shape (patches,).
     """
     count = int(patch.max()) + 1
     turned, doubtful = np.zeros(count, dtype=bool), []
@@ -102,7 +114,7 @@ def turned_patches(
 
 
 def _crossings(corner: NDArray[np.float64], point: NDArray[np.float64]) -> int:
-    """Triangles (T, 3, 3) that a ray from a point meets (Möller & Trumbore 1997)."""
+    """Number of triangles (T, 3, 3) that the ray from a point along ``_RAY`` crosses (Möller & Trumbore 1997)."""
     a, one, other = corner[:, 0], corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     across = np.cross(_RAY, other)
     scale = (one * across).sum(axis=1)

@@ -1,5 +1,4 @@
-"""Grasping by itself: placements around an object, a posture for its shape, the best of the hands that close
-(A §10, R90)."""
+"""Automatic grasp search: sample placements of an open hand, close it, judge the result, keep the best (A §10, R90)."""
 
 from __future__ import annotations
 
@@ -13,41 +12,41 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, Closer
-from warpjld.grasp.draws import Draws
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.judge import Judge, Verdict, check_friction, hand_side
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
 from warpjld.grasp.placements import Candidates
 from warpjld.grasp.postures import posture_for
+from warpjld.grasp.random_placements import Draws
 from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["AutoGrasp", "find_grasp"]
 
-_ROUND = 32  # placements looked at together
-_FINALISTS = 6  # of a round, closed and judged in full
-_DEEPEST = 6e-4  # of hand and object in one another, above which a grasp is refused [m]
-_PRESSED = 3e-4  # depth from which an open hand goes back [m]
-_GOOD = 0.12  # score that ends the search early [N]
-_SLACK = 1.2  # times what thumb and fingers span: what is wider everywhere is not tried
-_OTHERS = ("plate", "cylinder", "sphere", "pinch")  # postures in turn while nothing is found
-_CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # parts of the digits' way at which the hand must not be in an obstacle
+_ROUND = 32  # placements per round (batch)
+_FINALISTS = 6  # placements of a round that are closed and judged in full
+_DEEPEST = 6e-4  # largest penetration of hand and object in a grasp that is accepted [m]
+_PRESSED = 3e-4  # penetration above which an open hand is moved back along its approach [m]
+_GOOD = 0.12  # score at which the search may end early [N]
+_SLACK = 1.2  # an object is refused if it is nowhere narrower than this factor times the hand's opening
+_OTHERS = ("plate", "cylinder", "sphere", "pinch")  # further postures, tried in turn while nothing is found
+_CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # fractions of the closing motion at which collisions are tested
 
 
 @dataclass(frozen=True, eq=False)
 class AutoGrasp:
-    """The best grasp found.
+    """Result of ``find_grasp``: the best grasp found.
 
     Attributes:
-        posture: Name of the posture it began with.
+        posture: Name of the open posture it was closed from, one of ``POSTURES``.
         position: Displacement of the skeleton's root [m], shape (3,).
         rotation: Rotation of the root about its rest place, x y z w, shape (4,).
-        approach: Direction in which the hand came, shape (3,).
+        approach: Unit direction in which the open hand moved to its placement, shape (3,).
         start: Angles of the open hand [rad], shape (J, 4).
         angles: Angles of the closed hand [rad], shape (J, 4).
-        verdict: What it was chosen by.
-        touching: Digits that touch.
-        tried: Placements that were closed.
+        verdict: Contacts, force closure, epsilon and penetration of the closed hand.
+        touching: Names of the digits that press, e.g. ``left.index``.
+        tried: Number of placements that were closed.
     """
 
     posture: str
@@ -68,16 +67,16 @@ class AutoGrasp:
 
     @property
     def score(self) -> float:
-        """That of the verdict."""
+        """Score of the verdict [N], larger is better."""
         return self.verdict.score
 
     @property
     def penetration(self) -> float:
-        """Depth of hand and object in one another [m]."""
+        """Penetration depth of hand and object [m]."""
         return self.verdict.depth
 
     def poses(self, skeleton: Skeleton) -> Poses:
-        """The closed hand, one frame."""
+        """Pose of the closed hand, one frame."""
         return Candidates(self.position[None], self.rotation[None], self.approach[None], self.angles[None]).poses(
             skeleton
         )
@@ -96,36 +95,37 @@ def find_grasp(
     friction: float = 0.6,
     seed: int = 0,
 ) -> AutoGrasp:
-    """Place open hands about the object, close them, judge them, keep the best.
+    """Find a grasp: sample placements of an open hand around the object, close each, judge it, keep the best.
 
-    A posture is chosen by the object's shape, and varied; while nothing is found the others take every second round.
-    Three quarters of the placements put thumb and fingers across a part of the object that fits between them, such as
-    a rim, a handle or a narrow side, where the palm has room (``across_widths``, ``free_ways``), the others the palm on
-    it (``sample_wrists``).
-    They are taken in rounds of 32: all are closed roughly and ranked by the force closure of what nearly touches; the
-    best six are closed in full, without digits that pass through the object, and judged (``Judge``); those still in
-    the running then without digits that pass through one another. A grasp that is not force closed, or in which hand
-    and object are more than 0.6 mm in one another, is refused; of the others the best score is kept. A round that
-    leaves one with a score of 0.12 N and all digits but one (of a pinch all) ends the search, and once half of the
-    placements are tried any.
+    The open posture is chosen by the object's shape and varied at random; while nothing is found, other postures take
+    every second round. Three quarters of the placements put thumb and fingers across a part of the object that fits
+    between them, such as a rim, a handle or a narrow side, from directions in which the palm has room
+    (``across_widths``, ``free_ways``); the remaining quarter put the palm on the object (``sample_wrists``).
 
-    Obstacles are stayed clear of by 0.1 mm of depth: by the open hand on the last 12 cm of its way, and by its digits
-    while they close. Placements that they are in the way of are drawn again.
+    Placements are processed in rounds of 32. All are closed roughly and ranked by the force closure of contacts within
+    2.5 mm. The best six are closed in full, digits stopping at the object, and judged (``Judge``); for those that could
+    become the best, digits are then also kept from passing through one another. A grasp that is not force closed, or
+    has more than 0.6 mm of penetration, is refused; of the others the one with the best score is kept. The search ends
+    after a round in which a grasp has a score of 0.12 N and uses all digits but one (all digits, for a pinch), or, with
+    any grasp, once half of the placements are tried.
+
+    Obstacles may be penetrated by 0.1 mm at most: by the open hand on the last 12 cm of its approach, and by the digits
+    while they close. Placements that collide are drawn again.
 
     Args:
         covering: The hand, smooth method.
-        thing: The object, where it stands.
-        closer: Of the hand on the object, where there is one already.
-        obstacles: Other objects where they stand.
+        thing: The object at its own placement.
+        closer: ``Closer`` of this hand and object, to be reused; made if left out.
+        obstacles: Other objects at their placements.
         side: ``left`` or ``right``; may be left out for a single hand.
-        count: Placements at most.
-        posture: The only one of ``POSTURES`` that is tried; by the object's shape if left out.
+        count: Largest number of placements.
+        posture: The only one of ``POSTURES`` that is tried; chosen by the object's shape if left out.
         coupling: See :meth:`~warpjld.grasp.close.Closer.close`.
         friction: Coulomb coefficient.
-        seed: Of the sampling.
+        seed: Seed of the random numbers.
 
     Raises:
-        InputError: No hand, no such posture, an object nowhere narrow enough, or no placement ends in a grasp.
+        InputError: No hand, no such posture, an object that is nowhere narrow enough, or no placement led to a grasp.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -158,7 +158,7 @@ def find_grasp(
             least = best.score if best else 0.0
             if verdict.score <= least:
                 break
-            # whether digits cross is looked at last: it costs
+            # digits that cross one another are separated last, because this is expensive
             there = closer.parted(hand.poses(covering.skeleton), hand.angles, closed)
             (verdict,) = _verdicts(judge, covering, hand, there)
             if verdict.depth > _DEEPEST or verdict.score <= least:
@@ -192,9 +192,13 @@ def find_grasp(
 
 
 def _refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
-    """InputError where nothing of the object fits between thumb and fingers, with its width and theirs."""
+    """Refuse an object of which no part fits between thumb and fingers.
+
+    Raises:
+        InputError: States the object's smallest width and the hand's widest opening.
+    """
     thing, widest = draws.near.thing, draws.widest
-    if thing.size.min() <= _SLACK * widest:  # it costs to look closer, and next to none of these are
+    if thing.size.min() <= _SLACK * widest:  # an object this thin is hardly ever too wide, and measuring widths is slow
         return
     narrowest = draws.narrowest(friction)
     if narrowest > _SLACK * widest:
@@ -209,7 +213,7 @@ def _refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
 def _best_first(
     judge: Judge, closer: Closer, hands: Candidates, how: dict[str, Any]
 ) -> list[tuple[Candidates, Closed, Verdict]]:
-    """Hands closed and judged, digits not yet kept apart, the best score first; without those that are too deep."""
+    """Close and judge hands, digits not yet separated; best score first, without those that penetrate too deep."""
     if not len(hands):
         return []
     closed = closer.close(hands.poses(closer.covering.skeleton), hands.angles, apart=False, **how)
@@ -232,7 +236,7 @@ def _promising(
     obstacles: Obstacles,
     how: dict[str, Any],
 ) -> Candidates:
-    """Open hands that do best when closed roughly, best first, moved out of what they would press into."""
+    """Open hands that rank best after a rough closing, best first, moved back where they would penetrate the object."""
     if not len(hands):
         return hands
     covering = closer.covering
@@ -253,16 +257,16 @@ def _runs_into(covering: Covering, hand: Candidates, closed: NDArray[np.float64]
 
 
 def _clear_of(closer: Closer, side: str, hands: Candidates, closed: NDArray[np.float64]) -> Candidates:
-    """Open hands, moved back while the object presses into them, or will into the palm that swells as they close."""
+    """Move open hands back until neither they nor the palm, which swells as digits close, penetrate the object."""
     covering, both = closer.covering, closer.both
     palm = both.parts.index(f"{side}.palm")
     going, back = np.arange(len(hands)), np.zeros(len(hands))
     for _ in range(4):
         if not len(going):
             break
-        some = hands[going].moved(-back[going])
+        withdrawn = hands[going].moved(-back[going])
         opened, swollen = (
-            both.depths(covering.deform(some.poses(covering.skeleton, angles), threads=1))
+            both.depths(covering.deform(withdrawn.poses(covering.skeleton, angles), threads=1))
             for angles in (None, closed[going])
         )
         depth = np.maximum(opened.max(axis=1), swollen[:, palm])

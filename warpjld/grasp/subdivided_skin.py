@@ -1,4 +1,4 @@
-"""A skin with more points on the same triangles, for measures that its own vertices are too far apart for."""
+"""Midpoint subdivision of a skin: more sample points on the same triangles, for contact areas on coarse skins."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from warpjld.grasp.edges import edges_of_sides
 
 __all__ = ["FinerSkin"]
 
-_MOST = 3  # rounds: every one makes four triangles of one
+_MOST = 3  # largest number of subdivisions; each makes four triangles of one
 
 
 class FinerSkin:
-    """Triangles cut at the middles of their edges until the median edge at rest is shorter than asked for.
+    """Subdivision of a skin at edge midpoints until the median edge at rest is shorter than ``spacing``.
 
     Args:
-        vertices: At rest [m], shape (V, 3).
+        vertices: Rest positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        spacing: Length asked for [m]; infinite leaves the skin as it is.
+        spacing: Wanted edge length [m]; infinite leaves the skin as it is.
 
     Attributes:
-        faces: Finer triangles, shape (T·4ⁿ, 3).
-        parents: A vertex of the skin beside every finer one, shape (n,).
+        faces: Subdivided triangles, shape (T·4ᵏ, 3) after k subdivisions.
+        parents: For every fine point a vertex of the original skin next to it, shape (n,).
     """
 
     def __init__(self, vertices: NDArray[np.floating], faces: NDArray[np.int32], spacing: float) -> None:
@@ -39,7 +39,7 @@ class FinerSkin:
             self.parents = np.concatenate([self.parents, self.parents[edges[:, 0]]])
             self._middles.append(edges)
 
-        # every vertex beside itself: no row is empty
+        # every vertex is also its own neighbour, so that no row is empty
         own = np.arange(len(vertices))
         beside = np.concatenate([faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel(), own])
         others = np.concatenate([faces[:, [1, 2, 0]].ravel(), faces[:, [0, 1, 2]].ravel(), own])
@@ -64,14 +64,16 @@ class FinerSkin:
         return out
 
     def longest_edges(self, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Longest edge at every vertex of deformed skins (G, V, 3) [m], shape (G, V): no finer point of which it is the
-        parent is farther away."""
+        """Longest edge at every vertex of deformed skins (G, V, 3) [m], shape (G, V).
+
+        It bounds the distance from a vertex to every fine point of which it is the parent.
+        """
         a, b = self._edges
         length = np.linalg.norm(vertices[:, a] - vertices[:, b], axis=2)
         return np.asarray(np.maximum.reduceat(length, self._first_edge, axis=1), dtype=np.float64)
 
     def faces_around(self, points: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Triangles that have one of some points as a corner, ascending."""
+        """Sorted indices of the triangles with a corner among ``points``."""
         counts = self._first[points + 1] - self._first[points]
         within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         return np.unique(self._around[np.repeat(self._first[points], counts) + within])

@@ -5,8 +5,8 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
-from warpjld.grasp.auto import find_grasp
-from warpjld.grasp.draws import WAY
+from warpjld.grasp.approach_directions import free_ways
+from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.near_object import NearObject
@@ -15,8 +15,8 @@ from warpjld.grasp.obstacles import COLLIDES, Obstacles
 from warpjld.grasp.placements import sample_wrists
 from warpjld.grasp.postures import POSTURES, posture_angles, posture_for
 from warpjld.grasp.quality import penetration
+from warpjld.grasp.random_placements import WAY
 from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
-from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import sample_widths
 from warpjld.skeleton import poses_from_angles
 

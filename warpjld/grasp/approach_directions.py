@@ -1,4 +1,4 @@
-"""From where a hand can come to what it takes between thumb and fingers: where its palm has room."""
+"""Directions of approach to a width of the object from which the palm does not collide with the object."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from warpjld.grasp.widths import Widths
 
 __all__ = ["free_ways"]
 
-_ROLLS = 8  # directions tried about a width
-_BEHIND = (0.8, 1.0, 1.3, 1.7)  # where the palm and the wrist will be, as parts of the palm's distance from the pads
-_ROOM = 0.15  # half of the palm's thickness, likewise
+_ROLLS = 8  # directions tried around each width
+_BEHIND = (0.8, 1.0, 1.3, 1.7)  # test points from palm to wrist, as multiples of the distance from pads to palm
+_ROOM = 0.15  # clearance at these points (half of the palm's thickness), relative to the same distance
 
 
 def free_ways(
     near: NearObject, widths: Widths, reach: float, rng: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Directions at right angles to widths in which a hand can come, so that its palm is clear of the object.
+    """Directions of approach at right angles to widths, for which the palm would be clear of the object.
 
-    Of a bowl's wall these are the ways in over the rim, of a flat box those in over its edges, of a handle those from
-    the side of it. How far the hand goes on towards the palm from there is left open.
+    For a bowl's wall these are the directions over the rim, for a flat box those over its edges, for a handle those
+    from its side. Tested with the pads at the width; how far the hand then moves on is not considered.
 
     Args:
         near: The object.
-        widths: N of them, on the stage.
-        reach: How far the pads of thumb and fingers are from the palm's middle [m].
-        rng: Source of randomness.
+        widths: N widths in world space.
+        reach: Distance from the palm's centre to the pads of thumb and fingers [m].
+        rng: Source of random numbers.
 
     Returns:
-        Number of the width, shape (n,), and the unit direction in which the hand moves, shape (n, 3).
+        Index of the width, shape (n,), and the unit direction in which the hand moves, shape (n, 3).
     """
     line = unit(widths.second - widths.first)
     aside = unit(np.cross(line, np.eye(3)[np.abs(line).argmin(axis=1)]))

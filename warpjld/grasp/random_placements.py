@@ -1,4 +1,4 @@
-"""Placements of an open hand drawn at random: across what fits between thumb and fingers, or palm first."""
+"""Random placements of an open hand: thumb and fingers across a part that fits between them, or palm first."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.geometry.rotations import unit
+from warpjld.grasp.approach_directions import free_ways
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
@@ -18,34 +19,33 @@ from warpjld.grasp.opening import Opening, closing_in_air
 from warpjld.grasp.palm import palm_of
 from warpjld.grasp.placements import Candidates, across_widths, around, sample_wrists
 from warpjld.grasp.postures import AHEAD, CLOSING, POSTURES, posture_angles
-from warpjld.grasp.ways import free_ways
 from warpjld.grasp.widths import Widths, sample_widths
 from warpjld.skeleton import CHANNELS, DIGITS
 
 __all__ = ["WAY", "Draws", "preference"]
 
 WAY = 0.12
-"""How far off a hand is before it comes straight to its placement [m]."""
+"""Length of the straight approach of an open hand to its placement, on which it may not collide [m]."""
 
-_LINES = 400  # through the object, to find where it is narrow
+_LINES = 400  # random lines through the object, to find where it is narrow
 _PALM_FIRST = 0.25  # share of the placements that are made palm first
-_VARIANTS = 6  # of a posture
-_MOST_DRAWS = 8  # where obstacles are in the way
-_COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # parts of the way at which a hand must not be in an obstacle
+_VARIANTS = 6  # random variants of a posture
+_MOST_DRAWS = 8  # repetitions where obstacles are in the way
+_COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # distances back along the approach, in units of WAY, at which collisions are tested
 
 
 @dataclass(eq=False)
 class Draws:
-    """Placements for one object, as many as asked for.
+    """Sampler of placements of one hand in one open posture around one object.
 
     Attributes:
         covering: The hand.
         near: The object.
-        obstacles: What no hand may enter on its way to its placement.
-        side: Which hand.
+        obstacles: Objects that the hand may not enter on its approach.
+        side: ``left`` or ``right``.
         posture: Name of the posture.
-        rng: Source of randomness.
-        turned_down: Placements that obstacles were in the way of, so far.
+        rng: Source of random numbers.
+        turned_down: Number of placements rejected so far because of obstacles.
     """
 
     covering: Covering
@@ -63,35 +63,38 @@ class Draws:
 
     @cached_property
     def closing(self) -> list[str]:
-        """Digits that close, without side."""
+        """Names of the digits that close in this posture, without side."""
         there = digit_chains(self.covering.skeleton)
         return [digit for digit in CLOSING.get(self.posture, DIGITS) if f"{self.side}.{digit}" in there]
 
     @cached_property
     def widest(self) -> float:
-        """How far thumb and fingers open in any posture [m]."""
+        """Largest opening between thumb and fingers in any posture [m]."""
         starts = np.array([posture_angles(self.covering.skeleton, self.side, posture) for posture in POSTURES])
         return max(float(one.width[0]) for one in closing_in_air(self.covering, self.side, starts, self.closing))
 
     def narrowest(self, friction: float) -> float:
-        """Least of some widths of the object that friction holds between two contacts [m]; its size without any."""
+        """Smallest sampled width of the object that two contacts with this friction can hold [m].
+
+        The diagonal of its bounding box where there is none.
+        """
         size = float(np.linalg.norm(self.near.thing.size))
-        # of its own randomness: what is drawn later does not depend on it
+        # a generator of its own, so that later draws do not depend on whether this was called
         found = sample_widths(self.near, _LINES, np.random.default_rng(0), widest=size)
         return float(found.width[found.slant >= np.cos(np.arctan(friction))].min(initial=size))
 
     def draw(self, count: int) -> Candidates:
-        """``count`` placements, or fewer where obstacles leave little room."""
-        some = [self._both_kinds(count)]
+        """Draw ``count`` placements, or fewer where obstacles leave little room."""
+        drawn = [self._both_kinds(count)]
         if not self.obstacles:
-            return some[0]
-        some[0] = self._reached(some[0])
-        while sum(map(len, some)) < count and len(some) < _MOST_DRAWS:
-            some.append(self._reached(self._both_kinds(count)))
-        return Candidates.joined(some)[:count]
+            return drawn[0]
+        drawn[0] = self._reached(drawn[0])
+        while sum(map(len, drawn)) < count and len(drawn) < _MOST_DRAWS:
+            drawn.append(self._reached(self._both_kinds(count)))
+        return Candidates.joined(drawn)[:count]
 
     def _reached(self, hands: Candidates) -> Candidates:
-        """Those that come to their placement without entering an obstacle."""
+        """The hands whose straight approach to their placement enters no obstacle."""
         skins = self.covering.deform(hands.poses(self.covering.skeleton))
         backs = WAY * np.array(_COMES, dtype=np.float32)[:, None, None]
         shifts = -backs * hands.approach.astype(np.float32)
@@ -101,11 +104,12 @@ class Draws:
         return hands[np.flatnonzero(clear)]
 
     def _both_kinds(self, count: int) -> Candidates:
+        """Draw placements, three quarters across widths of the object where there are any, the others palm first."""
         openings = self._variants()
         most = max(one.width[0] for one in openings)
         widths = sample_widths(self.near, _LINES, self.rng, widest=float(most))
         across = count - int(_PALM_FIRST * count) if len(widths) else 0
-        some = []
+        drawn = []
         if across:
             middle = palm_of(self.covering.skeleton, self.side).middle
             reach = float(np.mean([np.linalg.norm(one.between[0] - middle) for one in openings]))
@@ -120,19 +124,21 @@ class Draws:
                 np.where(turned[:, None], picked.first, picked.second),
             )
             into = 0.3 if self.posture == "pinch" else 1.0
-            these = Widths(*ends, picked.slant)
-            some.append(
-                across_widths(self.covering, openings, self.near, these, ways[chosen], self.side, self.rng, into=into)
+            oriented = Widths(*ends, picked.slant)
+            drawn.append(
+                across_widths(
+                    self.covering, openings, self.near, oriented, ways[chosen], self.side, self.rng, into=into
+                )
             )
         if count > across:
             ahead = AHEAD.get(self.posture, 0.0)
-            some.append(
+            drawn.append(
                 sample_wrists(self.covering, self.start, self.near, self.side, count - across, self.rng, ahead=ahead)
             )
-        return Candidates.joined(some)
+        return Candidates.joined(drawn)
 
     def _variants(self) -> list[Opening]:
-        """The posture as it is, and with thumb and fingers a little elsewhere."""
+        """The posture itself, and random variants of it: thumb pivot and abduction, flexion of the finger bases."""
         skeleton, rng, starts = self.covering.skeleton, self.rng, []
         for variant in range(_VARIANTS):
             angles = self.start.copy()
@@ -151,7 +157,7 @@ class Draws:
 
 
 def preference(widths: Widths, thing: GraspObject) -> NDArray[np.float64]:
-    """How likely a width is taken: straight through, and near the centre of mass."""
+    """Probability of every width, shape (N,): larger where it is normal to the surface and near the centre of mass."""
     centre = thing.place.apply(thing.centroid[None])[0, 0]
     off = np.linalg.norm(0.5 * (widths.first + widths.second) - centre, axis=1)
     radius = np.linalg.norm(thing.vertices - thing.centroid, axis=1).max()
