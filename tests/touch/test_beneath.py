@@ -44,8 +44,11 @@ def test_means_over_near_faces_are_those_of_all_faces_measured_one_by_one() -> N
 
     @wp.kernel(module="unique")
     def measure(
-        trees: touch_beneath.PartTrees, part: int, points: wp.array(dtype=wp.vec3), out: wp.array2d(dtype=float)
-    ):  # type: ignore[no-untyped-def, valid-type]
+        trees: touch_beneath.PartTrees,
+        part: int,
+        points: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
+        out: wp.array2d(dtype=float),  # type: ignore[valid-type]
+    ) -> None:
         i = wp.tid()
         found = touch_beneath.beneath(trees, part, points[i], REACH, NARROWEST)
         mean = found.sure * found.normal
