@@ -12,7 +12,8 @@ def measure_displaced(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     part: wp.array(dtype=wp.int32),
-    sample_count: wp.array(dtype=wp.int32),
+    # first of the samples that act on every part
+    first_sample: wp.array(dtype=wp.int32),
     give: wp.array(dtype=float),
     # smoothing matrix in CSR layout
     first: wp.array(dtype=wp.int32),
@@ -28,7 +29,7 @@ def measure_displaced(
     v = wp.tid()
     k = part[v]
     ring_out[v] = 0.0
-    if sample_count[k] > 0:
+    if first_sample[k + 1] > first_sample[k]:
         shift = points[v] - before[v]
         around = float(0.0)
         for i in range(first[v], first[v + 1]):

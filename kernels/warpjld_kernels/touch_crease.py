@@ -53,8 +53,10 @@ def measure_creases(
     points: wp.array2d(dtype=wp.vec3),
     share: float,
     kept: float,
-    # out: whether a vertex may have to be pushed, with a margin for the effect of pushing others; its overlap with the
-    # opposite side [m]; and the largest overlap at every plane, relative to what both sides can yield
+    # out: number and rows of the vertices that may have to be pushed, with a margin for the effect of pushing others;
+    # the overlap of every vertex with the opposite side [m]; and the largest overlap at every plane, relative to what
+    # both sides can yield
+    count_out: wp.array(dtype=wp.int32),
     near_out: wp.array2d(dtype=wp.int32),
     overlap_out: wp.array2d(dtype=float),
     deepest_out: wp.array2d(dtype=float),
@@ -77,7 +79,8 @@ def measure_creases(
             overlap *= bent[frame, j] * counts(creases, entry, r, n)
             most = wp.max(most, overlap)
             wp.atomic_max(deepest_out, frame, j, overlap / (2.0 * share * creases.size[j]))
-    near_out[frame, row] = near
+    if near == 1:
+        near_out[frame, wp.atomic_add(count_out, frame, 1)] = row
     overlap_out[frame, v] = most
 
 
@@ -87,6 +90,7 @@ def push_creases(
     normal: wp.array2d(dtype=wp.vec3),
     bent: wp.array2d(dtype=float),
     points: wp.array2d(dtype=wp.vec3),
+    count: wp.array(dtype=wp.int32),
     near: wp.array2d(dtype=wp.int32),
     overlap: wp.array2d(dtype=float),
     deepest: wp.array2d(dtype=float),
@@ -101,60 +105,66 @@ def push_creases(
     full: float,
     none: float,
     # out
-    pushed_out: wp.array(dtype=wp.int32),
     shift_out: wp.array2d(dtype=wp.vec3),
 ):
-    """Displacement of every vertex away from its opposite point, half of the separation needed.
+    """Displacement of every vertex that may have to be pushed away from its opposite point, half of the separation
+    needed.
 
     The separation aimed at is a small distance plus a multiple of the smoothed overlap, but no more than a share of the
     distance at rest.
     """
-    frame, row = wp.tid()
-    v = creases.vertex[row]
-    p = points[frame, v]
-    around = float(0.0)
-    last = creases.first[row]
-    if near[frame, row] != 0:
-        last = creases.first[row + 1]
+    frame = wp.tid()
+    for n in range(count[frame]):
+        row = near[frame, n]
+        v = creases.vertex[row]
+        p = points[frame, v]
+        around = float(0.0)
         for i in range(row_first[v], row_first[v + 1]):
             around += value[i] * overlap[frame, column[i]]
-    shift = wp.vec3(0.0, 0.0, 0.0)
-    for entry in range(creases.first[row], last):
-        j = creases.crease[entry]
-        if bent[frame, j] == 0.0:
-            continue
-        n = normal[frame, j]
-        r = p - across(creases, entry, frame, points)
-        side = wp.sign(creases.height[entry])
-        apart = 2.0 * least * creases.size[j] + wp.min(wider * around, widest * creases.size[j])
-        apart = wp.min(apart, 2.0 * kept * wp.abs(creases.height[entry]))
-        missing = apart - side * wp.dot(r + shift, n)
-        if missing > 0.0:
-            shown = bent[frame, j] * wp.clamp((none - deepest[frame, j]) / (none - full), 0.0, 1.0)
-            shift += 0.5 * shown * counts(creases, entry, r, n) * missing * side * n
-    shift_out[frame, v] = shift
-    if wp.length_sq(shift) > 0.0:
-        pushed_out[frame] = 1
+        shift = wp.vec3(0.0, 0.0, 0.0)
+        for entry in range(creases.first[row], creases.first[row + 1]):
+            j = creases.crease[entry]
+            if bent[frame, j] == 0.0:
+                continue
+            towards = normal[frame, j]
+            r = p - across(creases, entry, frame, points)
+            side = wp.sign(creases.height[entry])
+            apart = 2.0 * least * creases.size[j] + wp.min(wider * around, widest * creases.size[j])
+            apart = wp.min(apart, 2.0 * kept * wp.abs(creases.height[entry]))
+            missing = apart - side * wp.dot(r + shift, towards)
+            if missing > 0.0:
+                shown = bent[frame, j] * wp.clamp((none - deepest[frame, j]) / (none - full), 0.0, 1.0)
+                shift += 0.5 * shown * counts(creases, entry, r, towards) * missing * side * towards
+        shift_out[frame, row] = shift
 
 
 @wp.kernel
 def move_smoothly(
-    # vertices with non-zero smoothed shifts
-    vertex: wp.array(dtype=wp.int32),
+    creases: Creases,
+    count: wp.array(dtype=wp.int32),
+    near: wp.array2d(dtype=wp.int32),
+    shift: wp.array2d(dtype=wp.vec3),
+    # transposed smoothing matrix in CSR layout
     row_first: wp.array(dtype=wp.int32),
     column: wp.array(dtype=wp.int32),
     value: wp.array(dtype=float),
-    pushed: wp.array(dtype=wp.int32),
-    shift: wp.array2d(dtype=wp.vec3),
+    # zeros, and zeros again afterwards
+    total: wp.array2d(dtype=wp.vec3),
     # in and out
     points: wp.array2d(dtype=wp.vec3),
 ):
     """Add smoothed shifts; vertices without one keep their exact values."""
-    frame, row = wp.tid()
-    v = vertex[row]
-    total = wp.vec3(0.0, 0.0, 0.0)
-    last = wp.where(pushed[frame] != 0, row_first[v + 1], row_first[v])
-    for i in range(row_first[v], last):
-        total += value[i] * shift[frame, column[i]]
-    if wp.length_sq(total) > 0.0:
-        points[frame, v] = points[frame, v] + total
+    frame = wp.tid()
+    for n in range(count[frame]):
+        row = near[frame, n]
+        if wp.length_sq(shift[frame, row]) > 0.0:
+            v = creases.vertex[row]
+            for i in range(row_first[v], row_first[v + 1]):
+                total[frame, column[i]] = total[frame, column[i]] + value[i] * shift[frame, row]
+    for n in range(count[frame]):
+        row = near[frame, n]
+        if wp.length_sq(shift[frame, row]) > 0.0:
+            v = creases.vertex[row]
+            for i in range(row_first[v], row_first[v + 1]):
+                points[frame, column[i]] = points[frame, column[i]] + total[frame, column[i]]
+                total[frame, column[i]] = wp.vec3(0.0, 0.0, 0.0)

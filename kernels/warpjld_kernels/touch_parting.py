@@ -2,13 +2,33 @@
 
 import warp as wp
 
+from warpjld_kernels.lanes import VECTORISED, prelude
 from warpjld_kernels.touch_parts import FAR, Parts
 from warpjld_kernels.touch_samples import Samples
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({**VECTORISED, "max_unroll": 1})
+
+_LANES = 8
 
 NEARLY = wp.constant(0.6)  # share of the deepest probe's depth above which vertices near a probe are tested too
 HOLDS = wp.constant(4.0)  # factor of a pair's separated share in the weight of its planes, up to a weight of 1
+
+
+@wp.struct
+class Assigned:
+    """The samples that act on the vertices of every part.
+
+    Those of part k are in places ``first[k]`` to ``last[k]``: the ``sample``, and in ``ball`` its point and the square
+    of its radius [m, m²], shape (4, places), with spare places at the end. ``lower`` and ``upper`` are the corners of
+    the box that contains the radii of a part's samples.
+    """
+
+    first: wp.array(dtype=wp.int32)
+    last: wp.array(dtype=wp.int32)
+    sample: wp.array(dtype=wp.int32)
+    ball: wp.array2d(dtype=float)
+    lower: wp.array(dtype=wp.vec3)
+    upper: wp.array(dtype=wp.vec3)
 
 
 @wp.kernel
@@ -63,6 +83,15 @@ def choose_pair_weights(
     deep_out[own, other] = NEARLY * deepest[own, other]
 
 
+@wp.func
+def acts_on(parts: Parts, own: int, other: int, side: int, k: int) -> int:
+    """The k-th part beside one of the two of a sample, -1 for none; a part beside both counts once."""
+    a = parts.beside[wp.where(side == 0, own, other), k]
+    if a >= 0 and side == 1 and parts.apart[own, a] == 2:
+        a = -1
+    return a
+
+
 @wp.kernel
 def assign_samples(
     samples: Samples,
@@ -70,28 +99,65 @@ def assign_samples(
     shown: wp.array2d(dtype=float),
     parts: Parts,
     # out
-    count_out: wp.array(dtype=wp.int32),
-    list_out: wp.array2d(dtype=wp.int32),
-    lower_out: wp.array(dtype=wp.vec3),
-    upper_out: wp.array(dtype=wp.vec3),
+    assigned: Assigned,
 ):
-    """List for every part the samples that act on its vertices, and the box that contains their radii."""
-    i = wp.tid()
-    own = samples.own[i]
-    other = samples.other[i]
-    if shown[own, other] == 0.0:
-        return
-    reach = wp.vec3(samples.radius[i], samples.radius[i], samples.radius[i])
-    for side in range(2):
-        for k in range(parts.beside.shape[1]):
-            a = parts.beside[wp.where(side == 0, own, other), k]
-            # a part next to both gets the sample once
-            if a >= 0 and (side == 0 or parts.apart[own, a] != 2):
-                at = wp.atomic_add(count_out, a, 1)
-                if at < list_out.shape[1]:
-                    list_out[a, at] = i
-                wp.atomic_min(lower_out, a, samples.point[i] - reach)
-                wp.atomic_max(upper_out, a, samples.point[i] + reach)
+    """List for every part the samples that act on its vertices, and the box that contains their radii: one thread."""
+    most = wp.min(samples.count[0], samples.vertex.shape[0])
+    names = parts.apart.shape[0]
+    for a in range(names + 1):
+        assigned.first[a] = 0
+    for a in range(names):
+        assigned.lower[a] = wp.vec3(FAR, FAR, FAR)
+        assigned.upper[a] = wp.vec3(-FAR, -FAR, -FAR)
+    # first how many there are: those of part a are counted in place a + 1
+    for i in range(most):
+        if shown[samples.own[i], samples.other[i]] > 0.0:
+            for side in range(2):
+                for k in range(parts.beside.shape[1]):
+                    a = acts_on(parts, samples.own[i], samples.other[i], side, k)
+                    if a >= 0:
+                        assigned.first[a + 1] = assigned.first[a + 1] + 1
+    for a in range(names):
+        assigned.first[a + 1] = assigned.first[a] + assigned.first[a + 1]
+        assigned.last[a] = assigned.first[a]
+    for i in range(most):
+        if shown[samples.own[i], samples.other[i]] > 0.0:
+            radius = samples.radius[i]
+            reach = wp.vec3(radius, radius, radius)
+            p = samples.point[i]
+            for side in range(2):
+                for k in range(parts.beside.shape[1]):
+                    a = acts_on(parts, samples.own[i], samples.other[i], side, k)
+                    if a >= 0:
+                        at = assigned.last[a]
+                        if at < assigned.sample.shape[0]:
+                            assigned.sample[at] = i
+                            for c in range(3):
+                                assigned.ball[c, at] = p[c]
+                            assigned.ball[3, at] = radius * radius
+                            assigned.last[a] = at + 1
+                        assigned.lower[a] = wp.min(assigned.lower[a], p - reach)
+                        assigned.upper[a] = wp.max(assigned.upper[a], p + reach)
+
+
+@wp.func_native(
+    prelude(_LANES)
+    + """
+    const size_t row = assigned.ball.shape[1];
+    const float* ball = assigned.ball.data;
+    for (int base = begin; base < end; base += N) {
+        const Floats x = *(const Stored*)(ball + base) - point[0];
+        const Floats y = *(const Stored*)(ball + row + base) - point[1];
+        const Floats z = *(const Stored*)(ball + 2 * row + base) - point[2];
+        unsigned int near = LANES_OF(x * x + y * y + z * z < *(const Stored*)(ball + 3 * row + base));
+        if (end - base < N) near &= (1u << (end - base)) - 1u;
+        if (near) return base + FIRST_OF(near);
+    }
+    return end;
+"""
+)
+def next_near(assigned: Assigned, point: wp.vec3, begin: int, end: int) -> int:
+    """The first of the samples in places from ``begin`` to ``end`` that a point lies within the radius of."""
 
 
 @wp.kernel
@@ -102,11 +168,7 @@ def part_surfaces(
     samples: Samples,
     # by pairs of parts: share of their overlap that is separated
     shown: wp.array2d(dtype=float),
-    # by part: number and indices of the samples that act on it, and the box that contains their radii
-    count: wp.array(dtype=wp.int32),
-    assigned: wp.array2d(dtype=wp.int32),
-    lower: wp.array(dtype=wp.vec3),
-    upper: wp.array(dtype=wp.vec3),
+    assigned: Assigned,
     # surface
     parts: Parts,
     clearance: float,
@@ -124,16 +186,19 @@ def part_surfaces(
     v = wp.tid()
     p = points[v]
     own = parts.part[v]
-    low = lower[own]
-    high = upper[own]
+    low = assigned.lower[own]
+    high = assigned.upper[own]
     d = wp.vec3(0.0, 0.0, 0.0)
     outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
     if not outside and parts.give[v] > 0.0:
         facing = wp.normalize(normals[v])
         matrix = wp.mat33(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         right = wp.vec3(0.0, 0.0, 0.0)
-        for k in range(wp.min(count[own], assigned.shape[1])):
-            i = assigned[own, k]
+        last = assigned.last[own]
+        k = next_near(assigned, p, assigned.first[own], last)
+        while k < last:
+            i = assigned.sample[k]
+            k = next_near(assigned, p, k + 1, last)
             r = p - samples.point[i]
             near = 1.0 - wp.length_sq(r) / (samples.radius[i] * samples.radius[i])
             if near > 0.0:
@@ -178,14 +243,3 @@ def move(
     v = wp.tid()
     if wp.length_sq(moved[v]) > 0.0:
         points[v] = points[v] + moved[v]
-
-
-@wp.kernel
-def clear_assigned(
-    count_out: wp.array(dtype=wp.int32), lower_out: wp.array(dtype=wp.vec3), upper_out: wp.array(dtype=wp.vec3)
-):
-    """Reset the samples of every part to none, and their boxes to empty ones."""
-    k = wp.tid()
-    count_out[k] = 0
-    lower_out[k] = wp.vec3(FAR, FAR, FAR)
-    upper_out[k] = wp.vec3(-FAR, -FAR, -FAR)

@@ -12,21 +12,17 @@ BESIDE = wp.constant(0.03)  # margin of a mesh's box, relative to the mesh's lar
 class Parts:
     """Pose-independent data of the parts.
 
-    ``corner`` lists the vertices of every part's mesh from ``first_corner`` on. ``border`` has three values a face from
-    3 ``first_face`` on: 0 at corners on the mesh's boundary, else 1. ``apart`` is 1 for pairs of parts that may touch,
-    2 for the same part and neighbours, else 0; ``beside`` lists the latter, padded with -1. ``bone`` holds the joints
-    at the ends of every part's segments from ``first_bone`` on, ``around`` the largest distance of its mesh from them
-    [m]. ``facing`` is 1 where overlaps count regardless of the orientation of both surfaces, else 0. By vertex:
-    ``thickness`` of the flesh [m], compliance ``give``, depth of the overlap ``at_rest`` [m], ``area`` [m²] and mean
-    ``edge`` length [m]; ``give_of`` is the mean compliance by part.
+    ``corner`` lists the vertices of every part's mesh from ``first_corner`` on. ``apart`` is 1 for pairs of parts that
+    may touch, 2 for the same part and neighbours, else 0; ``beside`` lists the latter, padded with -1. ``bone`` holds
+    the joints at the ends of every part's segments from ``first_bone`` on, ``around`` the largest distance of its mesh
+    from them [m]. ``facing`` is 1 where overlaps count regardless of the orientation of both surfaces, else 0. By
+    vertex: ``thickness`` of the flesh [m], compliance ``give``, depth of the overlap ``at_rest`` [m], ``area`` [m²] and
+    mean ``edge`` length [m]; ``give_of`` is the mean compliance by part.
     """
 
     part: wp.array(dtype=wp.int32)
-    mesh: wp.array(dtype=wp.uint64)
     first_corner: wp.array(dtype=wp.int32)
     corner: wp.array(dtype=wp.int32)
-    first_face: wp.array(dtype=wp.int32)
-    border: wp.array(dtype=float)
     apart: wp.array2d(dtype=wp.int32)
     beside: wp.array2d(dtype=wp.int32)
     thickness: wp.array(dtype=float)
@@ -77,7 +73,7 @@ def find_pairs(
     """Parts that may touch a part and whose boxes overlap its own."""
     k = wp.tid()
     count = int(0)
-    for other in range(parts.mesh.shape[0]):
+    for other in range(parts.apart.shape[0]):
         if parts.apart[k, other] == 1 and shown[k, other] > 0.0:
             margin = BESIDE * parts.around[other] * wp.vec3(1.0, 1.0, 1.0)
             low = wp.max(lower[k], lower[other] - margin)

@@ -2,12 +2,12 @@
 
 import warp as wp
 
-from warpjld_kernels.shells import nearest_weights
+from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.touch_beneath import PartTrees, beneath
 from warpjld_kernels.touch_parts import BESIDE, FAR, Parts
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
-NEARLY = wp.constant(0.5)  # faces up to this share farther than the nearest contribute to the outward direction
 UNSURE = wp.constant(0.0)  # length of the mean outward direction up to which its confidence is 0
 SURE = wp.constant(0.9)  # length from which its confidence is 1
 
@@ -53,112 +53,6 @@ def beside_bones(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.ve
     return wp.clamp(11.0 - 10.0 * least / wp.max(parts.around[k], 1.0e-30), 0.0, 1.0)
 
 
-@wp.func
-def may_be_behind(
-    points: wp.array(dtype=wp.vec3),
-    units: wp.array(dtype=wp.vec3),
-    parts: Parts,
-    k: int,
-    p: wp.vec3,
-    face: int,
-    u: float,
-    v: float,
-) -> bool:
-    """Whether a point is behind the closest point of a mesh by its interpolated normal, or that point lies next to the
-    mesh's boundary, where the sign is unreliable."""
-    mesh = wp.mesh_get(parts.mesh[k])
-    a = mesh.indices[3 * face]
-    b = mesh.indices[3 * face + 1]
-    c = mesh.indices[3 * face + 2]
-    w = 1.0 - u - v
-    n = u * units[a] + v * units[b] + w * units[c]
-    at = 3 * (parts.first_face[k] + face)
-    border = u * parts.border[at] + v * parts.border[at + 1] + w * parts.border[at + 2]
-    foot = u * points[a] + v * points[b] + w * points[c]
-    return wp.dot(p - foot, n) < 0.0 or border < 0.5
-
-
-@wp.struct
-class Beneath:
-    """Position of a point relative to the mesh of a part, averaged over near faces.
-
-    ``depth`` below the surface [m], outward ``normal``, its confidence ``sure`` (length of the mean normal), thickness
-    of the flesh ``thick`` [m], :func:`smooth_skin` in ``plain``, and ``border``, 0 at the mesh's boundary.
-    """
-
-    depth: float
-    normal: wp.vec3
-    sure: float
-    thick: float
-    plain: float
-    border: float
-
-
-@wp.func
-def beneath(
-    points: wp.array(dtype=wp.vec3),
-    units: wp.array(dtype=wp.vec3),
-    plains: wp.array(dtype=float),
-    parts: Parts,
-    k: int,
-    p: wp.vec3,
-    least: float,
-) -> Beneath:
-    """Weighted means over the faces that are about as near as the nearest, whose distance is ``least`` [m].
-
-    The closest face alone would make the outward direction discontinuous where another face becomes the closest. In the
-    middle of the flesh the directions cancel: the length of their mean is a measure of confidence.
-    """
-    out = Beneath()
-    mesh = wp.mesh_get(parts.mesh[k])
-    width = NEARLY * least + 1.0e-3 * parts.around[k] + 1.0e-9
-    reach = least + width
-    box = wp.vec3(reach, reach, reach)
-    total = float(0.0)
-    query = wp.mesh_query_aabb(parts.mesh[k], p - box, p + box)
-    face = int(0)
-    while wp.mesh_query_aabb_next(query, face):
-        a = mesh.indices[3 * face]
-        b = mesh.indices[3 * face + 1]
-        c = mesh.indices[3 * face + 2]
-        pa = points[a]
-        pb = points[b]
-        pc = points[c]
-        # skip faces whose box lies outside the ball of radius ``reach``
-        low = wp.min(wp.min(pa, pb), pc)
-        high = wp.max(wp.max(pa, pb), pc)
-        beyond = wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0))
-        if wp.length_sq(beyond) >= reach * reach:
-            continue
-        bary = nearest_weights(p, pa, pb, pc)
-        u = bary[0]
-        v = bary[1]
-        w = bary[2]
-        r = p - (u * pa + v * pb + w * pc)
-        near = 1.0 - (wp.length(r) - least) / width
-        if near > 0.0:
-            area = wp.length(wp.cross(pb - pa, pc - pa))
-            weight = area * near * near
-            n = wp.normalize(u * units[a] + v * units[b] + w * units[c])
-            total += weight
-            out.normal += weight * n
-            out.depth -= weight * wp.dot(r, n)
-            out.thick += weight * (u * parts.thickness[a] + v * parts.thickness[b] + w * parts.thickness[c])
-            out.plain += weight * wp.min(wp.min(plains[a], plains[b]), plains[c])
-            at = 3 * (parts.first_face[k] + face)
-            border = u * parts.border[at] + v * parts.border[at + 1] + w * parts.border[at + 2]
-            out.border += weight * wp.min(2.0 * border, 1.0)
-    total = wp.max(total, 1.0e-30)
-    out.depth /= total
-    out.thick /= total
-    out.plain /= total
-    out.border /= total
-    out.normal /= total
-    out.sure = wp.length(out.normal)
-    out.normal = wp.normalize(out.normal)
-    return out
-
-
 @wp.kernel
 def find_samples(
     # vertices that are tested, and weight of their samples by pairs of parts; at weight 0 they are not tested
@@ -172,6 +66,7 @@ def find_samples(
     points: wp.array(dtype=wp.vec3),
     units: wp.array(dtype=wp.vec3),
     plains: wp.array(dtype=float),
+    trees: PartTrees,
     lower: wp.array(dtype=wp.vec3),
     upper: wp.array(dtype=wp.vec3),
     count: wp.array(dtype=wp.int32),
@@ -218,12 +113,10 @@ def find_samples(
             near *= beside_bones(joints, parts, k, p)
         if near > 0.0 and (pair_weight[own, k] > 0.0 or around > deep_enough[own, k]):
             reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
-            found = wp.mesh_query_point_no_sign(parts.mesh[k], p, reach)
-            if found.result and may_be_behind(points, units, parts, k, p, found.face, found.u, found.v):
-                foot = wp.mesh_eval_position(parts.mesh[k], found.face, found.u, found.v)
-                least = wp.length(p - foot)
+            over = beneath(trees, k, p, reach, 1.0e-3 * parts.around[k] + 1.0e-9)
+            least = over.least
+            if least >= 0.0:
                 near *= wp.min(5.0 - 5.0 * least / reach, 1.0)
-                over = beneath(points, units, plains, parts, k, p, least)
                 if over.depth > 0.0:
                     n = over.normal
                     sure = wp.clamp((over.sure - UNSURE) / (SURE - UNSURE), 0.0, 1.0)

@@ -8,6 +8,10 @@ in one place it would be a lump, and inside the bend it would be folded in again
 
 Flexing one joint moves everything beyond it as a rigid body about the joint, so with the joint as the origin only faces
 that deform change the sum Σ a · (b × c) / 6.
+
+Where digits are joined by webs, or lie so close that their flesh is one, flexing one alone crushes what joins it to its
+neighbours, and flexing all together does not. So joints of one rank are also measured together, and their amplitudes
+multiplied by the factor that serves both best.
 """
 
 from __future__ import annotations
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
 
     from warpjld.covering.covering import Covering
+    from warpjld.covering.parameters import Parameters
     from warpjld.skeleton.tree import Skeleton
 else:
     sp = lazy_module("scipy.sparse")
@@ -42,21 +47,22 @@ __all__ = ["volume_keeping"]
 # proportion to it
 _PARTS = (0.33, 0.67, 1.0)
 _WIDEST = np.radians(110.0)  # largest flexion that is measured: beyond, limbs touch each other
-_MOST = 0.8  # upper bound of the amplitudes
+_MOST = 1.2  # upper bound of the amplitudes: larger ones stretch the outside by half as much again, for a percent
+_ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of those of its rank
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _ABDUCTION = CHANNELS.index("abduction")
 
 
 def volume_keeping(covering: Covering) -> NDArray[np.float64]:
-    """Swelling amplitudes with which flexing a single joint preserves the volume of the flesh, shape (J,).
+    """Swelling amplitudes with which flexing joints, singly and together, preserves the flesh's volume, shape (J,).
 
-    They lie between 0 and 4/5: a joint whose flesh gains volume gets 0, and the upper bound applies where hardly any
+    They lie between 0 and 6/5: a joint whose flesh gains volume gets 0, and the upper bound applies where hardly any
     flesh lies on the outside of a joint.
     """
     skeleton = covering.skeleton
     largest = np.minimum(skeleton.limits[:, FLEXION, 1], _WIDEST)
     bends = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children]) & (largest > 1e-6)
-    amplitudes = np.zeros(len(skeleton))
+    amplitudes, lost = np.zeros(len(skeleton)), np.zeros(len(skeleton))
     joints = np.flatnonzero(bends)
     if not joints.size or not len(covering.flesh.faces):
         return amplitudes
@@ -74,8 +80,62 @@ def volume_keeping(covering: Covering) -> NDArray[np.float64]:
         part = bending.around(int(joint))
         if part is not None:
             ratio = drivers.flexion_ratio[frames, joint]
-            amplitudes[joint] = part.amplitude(drivers.positions[frames], turns[frames], scalars[frames], ratio)
-    return amplitudes
+            fitted = part.amplitude(drivers.positions[frames], turns[frames], scalars[frames], ratio)
+            amplitudes[joint], lost[joint] = fitted
+    return amplitudes * _together(covering, bending, parameters, amplitudes, lost)
+
+
+def _together(
+    covering: Covering,
+    bending: _Bending,
+    parameters: Parameters,
+    amplitudes: NDArray[np.float64],
+    lost: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Factors of the amplitudes (J,), the same for all joints of a rank, shape (J,).
+
+    Least squares over the poses in which the joints of a rank are flexed singly, where the factor 1 leaves no error and
+    0 the volume ``lost`` [m³] (J,), and the one in which they are flexed together, which counts as all the others.
+    """
+    skeleton = covering.skeleton
+    ranks = [joints for joints in _ranks(skeleton) if (amplitudes[joints] > 0.0).sum() > 1]
+    factors = np.ones(len(skeleton))
+    if not ranks:
+        return factors
+    angles = np.repeat(skeleton.initial[None], len(ranks), axis=0)
+    for row, joints in zip(angles, ranks, strict=True):
+        row[joints, FLEXION] = np.minimum(skeleton.limits[joints, FLEXION, 1], _WIDEST)
+    drivers = drive(skeleton, covering.anchors, poses_from_angles(skeleton, angles))
+    turns = np.concatenate([drivers.halfway, drivers.rotations], axis=1)
+    whole = bending.whole(amplitudes)
+    scalars = scalar_inputs(covering.anchors, parameters, drivers)
+    gained = whole.gained(drivers.positions, turns, scalars, bending.swelling(drivers.flexion_ratio * amplitudes))
+    for joints, (without, swollen) in zip(ranks, gained, strict=True):
+        singly = float(lost[joints] @ lost[joints])
+        slope, weight = swollen - without, len(joints)
+        square = singly + weight * slope**2
+        if square > 0.0:
+            factors[joints] = np.clip((singly - weight * slope * without) / square, 0.0, 1.0)
+    return factors
+
+
+def _ranks(skeleton: Skeleton) -> list[NDArray[np.int64]]:
+    """Joints of the same rank: equally many joints beyond the same joint with several children, and flexing about
+    nearly the same axis, as fingers do and a thumb beside them does not."""
+    ranks: dict[tuple[int, int], list[int]] = {}
+    for joint in range(len(skeleton)):
+        above, steps = int(skeleton.parents[joint]), 1
+        while above >= 0 and len(skeleton.children[above]) == 1:
+            above, steps = int(skeleton.parents[above]), steps + 1
+        if above >= 0:
+            ranks.setdefault((above, steps), []).append(joint)
+    out = []
+    for joints in ranks.values():
+        axes = skeleton.axes[joints]
+        alike = np.array(joints)[axes @ unit(axes.sum(axis=0)) > _ALIKE]
+        if len(alike) > 1:
+            out.append(alike)
+    return out
 
 
 def _measured(skeleton: Skeleton, joint: int, largest: float) -> NDArray[np.float64]:
@@ -106,6 +166,17 @@ class _Bending:
         share = 1.0 / np.maximum(np.bincount(loop, minlength=rims), 1)[loop]
         mean = sp.csr_array((share, (loop, boundary[:, 0])), shape=(rims, count))
         self._corners = sp.vstack([sp.eye_array(count, format="csr"), mean], format="csr")
+
+    def whole(self, amplitudes: NDArray[np.float64]) -> _Part:
+        """All of the surface, whose joints swell by these amplitudes, shape (J,)."""
+        rows, initial = self._rows, initial_ratio(self._skeleton)
+        swelling = self._swellings @ amplitudes
+        at_rest = (self._swellings @ (initial * amplitudes)) / (1.0 + rows.scales[:, : len(initial)] @ initial)
+        return _Part(np.zeros(3), self._rest, self._faces, self._corners, swelling, at_rest, rows)
+
+    def swelling(self, amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Swelling of every vertex by joints with these amplitudes (F, J), shape (F, V)."""
+        return np.asarray((self._swellings @ amplitudes.T).T)
 
     def around(self, joint: int) -> _Part | None:
         """The part of the surface whose faces deform when a joint is flexed; None where there is none."""
@@ -189,8 +260,9 @@ class _Part:
         turns: NDArray[np.float64],
         scalars: NDArray[np.float64],
         ratio: NDArray[np.float64],
-    ) -> float:
-        """Swelling amplitude of the least squared volume error over F frames (Gauss–Newton).
+    ) -> tuple[float, float]:
+        """Swelling amplitude of the least squared volume error over F frames (Gauss–Newton), and the volume [m³] lost
+        without it where the joint is flexed farthest.
 
         Args:
             positions: Joint positions [m], shape (F, J, 3).
@@ -198,17 +270,8 @@ class _Part:
             scalars: From ``scalar_inputs``, shape (F, inputs).
             ratio: Flexion ratio of the joint, shape (F,).
         """
-        rows, before = self.rows, self._volume(self.rest - self.pivot)
-        lines: list[_Line] = []
-        for k in range(len(ratio)):
-            turn = unit(rows.turns @ turns[k])
-            out = rotate(turn, rows.offset)
-            grown = (1.0 + rows.scales @ scalars[k, : rows.scales.shape[1]])[:, None]
-            vertex = np.repeat(np.arange(len(rows.offset)), np.diff(rows.muscles.indptr))
-            driven = rows.muscles.data * scalars[k, rows.scales.shape[1] :][rows.muscles.indices]
-            muscle = [np.bincount(vertex, driven * height, len(rows.offset)) for height in rows.heights.T]
-            base = rows.positions @ positions[k] - self.pivot + rotate(turn, np.stack(muscle, axis=1))
-            lines.append((base, grown * out, (ratio[k] * self.swelling)[:, None] * out))
+        before = self._volume(self.rest - self.pivot)
+        lines = self._lines(positions, turns, scalars, ratio[:, None] * self.swelling)
         gained = self._volumes(lines, 0.0) - before
         # only directions of motion that lose volume are fitted: a thumb may gain volume to one side and lose it to the
         # other
@@ -221,9 +284,41 @@ class _Part:
             slope = self._volumes(lines, best + step) - before - lost
             square = float(slope @ slope) / step
             if square <= 0.0:
-                return 0.0
+                return 0.0, 0.0
             best = min(max(best - float(slope @ lost) / square, 0.0), _MOST)
-        return best
+        return best, max(-float(gained[len(_PARTS) - 1]), 0.0)
+
+    def gained(
+        self,
+        positions: NDArray[np.float64],
+        turns: NDArray[np.float64],
+        scalars: NDArray[np.float64],
+        swelling: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Change of the volume of every frame [m³] without swelling and with it, shape (F, 2); swelling of every frame
+        and vertex in ``swelling``, shape (F, n), else as :meth:`amplitude`."""
+        lines, before = self._lines(positions, turns, scalars, swelling), self._volume(self.rest - self.pivot)
+        return np.stack([self._volumes(lines, amplitude) - before for amplitude in (0.0, 1.0)], axis=1)
+
+    def _lines(
+        self,
+        positions: NDArray[np.float64],
+        turns: NDArray[np.float64],
+        scalars: NDArray[np.float64],
+        swelling: NDArray[np.float64],
+    ) -> list[_Line]:
+        """Positions of every frame as a function of the amplitude; arguments as of :meth:`gained`."""
+        rows, lines = self.rows, []
+        for k in range(len(positions)):
+            turn = unit(rows.turns @ turns[k])
+            out = rotate(turn, rows.offset)
+            grown = (1.0 + rows.scales @ scalars[k, : rows.scales.shape[1]])[:, None]
+            vertex = np.repeat(np.arange(len(rows.offset)), np.diff(rows.muscles.indptr))
+            driven = rows.muscles.data * scalars[k, rows.scales.shape[1] :][rows.muscles.indices]
+            muscle = [np.bincount(vertex, driven * height, len(rows.offset)) for height in rows.heights.T]
+            base = rows.positions @ positions[k] - self.pivot + rotate(turn, np.stack(muscle, axis=1))
+            lines.append((base, grown * out, swelling[k, :, None] * out))
+        return lines
 
     def _volumes(self, lines: list[_Line], amplitude: float) -> NDArray[np.float64]:
         """Volume of every frame [m³], shape (frames,). Offsets are divided by the swelling at rest, so that the rest

@@ -149,28 +149,29 @@ class Creases:
         bent = wp.array(
             np.clip((angle - _BENT[0]) / (_BENT[1] - _BENT[0]), 0.0, 1.0).astype(np.float32), dtype=float, device="cpu"
         )
-        creases, reached, *rows = self._arrays
-        size = (len(poses), len(self.vertex))
+        creases, rows, columns = self._arrays
+        frames, size = len(poses), (len(poses), len(self.vertex))
+        count = wp.zeros(frames, dtype=wp.int32, device="cpu")
         near = wp.empty(size, dtype=wp.int32, device="cpu")
         overlap = wp.zeros(points.shape, dtype=float, device="cpu")
-        deepest = wp.zeros((len(poses), len(self.joint)), dtype=float, device="cpu")
-        pushed = wp.zeros(len(poses), dtype=wp.int32, device="cpu")
-        shift = wp.zeros(points.shape, dtype=wp.vec3, device="cpu")
-        measured = [near, overlap, deepest]
+        deepest = wp.zeros((frames, len(self.joint)), dtype=float, device="cpu")
+        measured = [count, near, overlap, deepest]
         inputs = [creases, turned, bent, points, SHARE, _KEPT]
         wp.launch(measure_creases, size, inputs=inputs, outputs=measured, device="cpu")
+        if not count.numpy().any():
+            return
+        shift = wp.empty(size, dtype=wp.vec3, device="cpu")
+        total = wp.zeros(points.shape, dtype=wp.vec3, device="cpu")
         amounts = [_KEPT, _LEAST_APART, _WIDER, _WIDEST, FULL, NONE]
         for _ in range(_STEPS):
             inputs = [creases, turned, bent, points, *measured, *rows, *amounts]
-            wp.launch(push_creases, size, inputs=inputs, outputs=[pushed, shift], device="cpu")
-            if not pushed.numpy().any():
-                break
-            inputs = [reached, *rows, pushed, shift]
-            wp.launch(move_smoothly, (len(poses), len(reached)), inputs=inputs, outputs=[points], device="cpu")
+            wp.launch(push_creases, frames, inputs=inputs, outputs=[shift], device="cpu")
+            inputs = [creases, count, near, shift, *columns, total]
+            wp.launch(move_smoothly, frames, inputs=inputs, outputs=[points], device="cpu")
 
     @cached_property
-    def _arrays(self) -> list[Any]:
-        """Kernel arguments: the creases, the vertices that smoothing reaches from them, and the smoothing matrix."""
+    def _arrays(self) -> tuple[Any, list[Any], list[Any]]:
+        """Kernel arguments: the creases, and the smoothing matrix by rows and by columns."""
         import warp as wp
         from warpjld_kernels.touch_crease import Creases as Arrays
 
@@ -181,12 +182,11 @@ class Creases:
         out = Arrays()
         for name, kind in Arrays.vars.items():
             setattr(out, name, array(getattr(self, name), kind.type.dtype))
-        pushed = np.zeros(self.smooth.shape[0])
-        pushed[self.vertex] = 1.0
-        reached = np.flatnonzero(self.smooth @ pushed)
-        kinds = (wp.int32, wp.int32, wp.int32, float)
-        arrays = (reached, self.smooth.indptr, self.smooth.indices, self.smooth.data)
-        return [out, *(array(values, kind) for values, kind in zip(arrays, kinds, strict=True))]
+        rows, columns = (
+            [array(matrix.indptr, wp.int32), array(matrix.indices, wp.int32), array(matrix.data, float)]
+            for matrix in (self.smooth, csr_array(self.smooth.T))
+        )
+        return out, rows, columns
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 
 from warpjld.covering.binding import smoothstep
 from warpjld.touch.host_arrays import floats, numbers, recorded, starts, vectors
+from warpjld.touch.part_trees import part_trees
 from warpjld.touch.patches import Patches
 
 __all__ = ["FULL", "NONE", "SHARE", "Bench", "Model", "Overlaps", "fade"]
@@ -32,6 +33,8 @@ _SWELLS = 1.1  # factor of a mesh's largest distance from its bones at rest, to 
 # spacing, relative to a part's median thickness, of the probes that are tested first, and of the vertices that suffice
 # where the probes' depth is larger than _FEW; the weight of all others fades over as much again
 _PROBES, _APART, _FEW = 1.0, 0.3, 0.35
+_ACTS_ON = 16  # places, by vertex of the surface, for samples in the lists of the parts that they act on
+_LANES = 8  # spare places at the end of these, which are read with the last ones
 _BULGE = 0.5  # largest height of a bulge
 
 
@@ -84,7 +87,7 @@ class Model:
 
 
 class Bench:
-    """Workspace of one thread: meshes of the parts, refitted for every frame, arrays, and recorded kernel launches.
+    """Workspace of one thread: trees of the parts, fitted to every frame, arrays, and recorded kernel launches.
 
     Launches are recorded once, since packing their arguments would take as long as the kernels of a frame.
     """
@@ -93,11 +96,12 @@ class Bench:
         import warp as wp
 
         wp.init()
-        self._meshes: list[Any] = []
         count, names = len(vertices), len(model.patches.names)
         self.points = vectors(vertices)
         self.joints = vectors(np.zeros((max(model.joints, 1), 3)))
-        self.parts = self._parts(model, vertices)
+        meshes = [model.patches.mesh(k) for k in range(names)]
+        self.parts = self._parts(model, vertices, [faces for faces, _ in meshes])
+        self.trees = part_trees(vertices, meshes, model.patches.thickness)
         self.samples = _no_samples(2 * count)
         faces = model.patches.faces
         order = np.argsort(faces.ravel(), kind="stable")
@@ -116,28 +120,23 @@ class Bench:
         tested = [np.flatnonzero(mask) for mask in (first, apart & ~first, ~apart & ~first)]
         self._record(star, smooth, tested, beside)
 
-    def _parts(self, model: Model, vertices: NDArray[np.floating]) -> Any:
+    def _parts(self, model: Model, vertices: NDArray[np.floating], meshes: list[NDArray[np.int32]]) -> Any:
         """The kernels' struct ``touch_parts.Parts``."""
         import warp as wp
         from warpjld_kernels.touch_parts import Parts
 
         patches, names = model.patches, len(model.patches.names)
-        meshes = [patches.mesh(k) for k in range(names)]
-        self._meshes = [wp.Mesh(self.points, numbers(f.ravel())) if len(f) else None for f, _ in meshes]
-        corners = [np.unique(f) for f, _ in meshes]
+        corners = [np.unique(f) for f in meshes]
         joined = patches.joined
-        empty = np.array([not len(f) for f, _ in meshes], dtype=bool)
+        empty = np.array([not len(f) for f in meshes], dtype=bool)
         beside = np.full((names, int(joined.sum(axis=1).max())), -1)
         for k, row in enumerate(joined):
             near = np.flatnonzero(row)
             beside[k, : len(near)] = near
         parts = Parts()
         parts.part = numbers(patches.part)
-        parts.mesh = wp.array([m.id if m else 0 for m in self._meshes], dtype=wp.uint64, device="cpu")
         parts.first_corner = starts([len(c) for c in corners])
         parts.corner = numbers(np.concatenate(corners))
-        parts.first_face = starts([len(f) for f, _ in meshes])
-        parts.border = floats(np.concatenate([b.ravel() for _, b in meshes]))
         parts.apart = numbers(np.where(joined, 2, np.where(empty[:, None] | empty | model.never, 0, 1)))
         parts.beside = numbers(beside)
         parts.thickness = floats(patches.thickness)
@@ -164,9 +163,9 @@ class Bench:
         """Record all kernel launches, from the faces around every vertex, the smoothing matrix, the three groups of
         vertices that are tested in turn, and the nearest probe of every vertex."""
         import warp as wp
-        from warpjld_kernels import touch_parts
+        from warpjld_kernels import touch_beneath, touch_parts
 
-        count, names = len(self.points), len(self._meshes)
+        count, names = len(self.points), len(self._wanted)
         parts, points = self.parts, self.points
         low, high, reach_low, reach_high = (wp.zeros(names, dtype=wp.vec3, device="cpu") for _ in range(4))
         boxes = [reach_low, reach_high]
@@ -190,7 +189,11 @@ class Bench:
             [points, parts.part, self._active, *star, parts.area],
             [self._normals, units, plains],
         )
-        self._record_samples([points, units, plains, low, high, pairs, others, self.joints, *boxes], tested, beside)
+        self._fit_trees = recorded(
+            touch_beneath.fit_trees, names, [self._wanted, points, units, plains, self.trees], []
+        )
+        found = [points, units, plains, self.trees, low, high, pairs, others]
+        self._record_samples([*found, self.joints, *boxes], tested, beside)
         self._record_parting(boxes, smooth)
 
     def _record_samples(self, frame: list[Any], tested: list[NDArray[np.int64]], beside: NDArray[np.int64]) -> None:
@@ -198,7 +201,7 @@ class Bench:
         import warp as wp
         from warpjld_kernels import touch_parting, touch_samples
 
-        count, names, parts = len(self.points), len(self._meshes), self.parts
+        count, names, parts = len(self.points), len(self._wanted), self.parts
         probed, apart, others = (wp.ones((names, names), dtype=float, device="cpu") for _ in range(3))
         self._pair_weights = apart.numpy(), others.numpy()
         deep = wp.zeros((names, names), dtype=float, device="cpu")
@@ -226,18 +229,20 @@ class Bench:
         import warp as wp
         from warpjld_kernels import touch_bulge, touch_parting
 
-        count, names = len(self.points), len(self._meshes)
+        count, names = len(self.points), len(self._wanted)
         parts, points, normals, samples = self.parts, self.points, self._normals, self.samples
-        sample_count = wp.zeros(names, dtype=wp.int32, device="cpu")
-        assigned = wp.zeros((names, count), dtype=wp.int32, device="cpu")
-        outputs = [sample_count, assigned, *boxes]
-        self._clear_assigned = recorded(touch_parting.clear_assigned, names, [], [sample_count, *boxes])
-        self._assign = recorded(touch_parting.assign_samples, 1, [samples, self._shown, parts], outputs)
+        assigned = self._assigned = touch_parting.Assigned()
+        assigned.first = wp.zeros(names + 1, dtype=wp.int32, device="cpu")
+        assigned.last = wp.zeros(names, dtype=wp.int32, device="cpu")
+        assigned.sample = wp.zeros(_ACTS_ON * count, dtype=wp.int32, device="cpu")
+        assigned.ball = wp.zeros((4, _ACTS_ON * count + _LANES), dtype=float, device="cpu")
+        assigned.lower, assigned.upper = boxes
+        self._assign = recorded(touch_parting.assign_samples, 1, [samples, self._shown, parts, assigned], [])
         self._part = [
             recorded(
                 touch_parting.part_surfaces,
                 count,
-                [points, normals, samples, self._shown, *outputs, parts, _CLEARANCE, _SOFT, _STIFFNESS],
+                [points, normals, samples, self._shown, assigned, parts, _CLEARANCE, _SOFT, _STIFFNESS],
                 [self._moved],
             ),
             recorded(touch_parting.move, count, [self._moved], [points]),
@@ -247,7 +252,7 @@ class Bench:
             recorded(
                 touch_bulge.measure_displaced,
                 count,
-                [self._start, points, normals, parts.part, sample_count, parts.give, *smooth],
+                [self._start, points, normals, parts.part, assigned.first, parts.give, *smooth],
                 displaced,
             ),
             recorded(
@@ -279,8 +284,6 @@ class Bench:
                 self._fade.launch()
             if not count:
                 break
-            self._clear_assigned.launch()
-            self._assign.set_dim(count)
             for command in (self._assign, *self._part):
                 command.launch()
             if sweep == 0:
@@ -316,13 +319,10 @@ class Bench:
         self._count[...] = 0
         for command in self._find_pairs:
             command.launch()
-        queried = np.flatnonzero(wanted).tolist()
-        if not queried:
+        if not wanted.any():
             return 0
-        for k in queried:
-            if (mesh := self._meshes[k]) is not None:
-                mesh.refit()
         self._find_normals.launch()
+        self._fit_trees.launch()
         self._probe.launch()
         if choose:
             self._choose.launch()
