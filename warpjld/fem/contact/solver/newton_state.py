@@ -29,6 +29,9 @@ _PLACES = 0.03
 _TURNING = 1
 """Iterations after which normals stay where their derivatives are not known; weights follow until they no longer change
 the gaps. That both are right is looked at once forces balance."""
+_STALE = 0.025
+"""Way of a node since points were seen, over what they look ahead, from which on they are seen afresh again: along a
+curved surface gaps change with the way's square."""
 _FIXED_POINT = 8
 """Iterations with full steps and multipliers brought up to date at once; what has not settled by then takes turns."""
 _SAME = 2
@@ -177,7 +180,14 @@ class NewtonState:
         """Whether forces balance as the points see them."""
         if not (self.arrived and self._near):
             return False
-        return self._quiet or self.system.settled(self.contact, self.states, self._negligible)
+        return self._quiet or (self.system.settled(self.contact, self.states, self._negligible) and self._lawful())
+
+    def _lawful(self) -> bool:
+        """Whether friction acts against slip: what the multipliers took to slide may slide another way by now."""
+        if not any(t.friction.any() for t in self.contact.tractions):
+            return True
+        found = self.forces(self.contact.points, self.u, ActiveSet.TRIAL, coupled=self.contact.coupled)
+        return self.system.settled(found, self.states, self._negligible)
 
     def confirmed(self) -> bool:
         """Whether the points see what is so; where not, the search goes on, carefully, with points that do: it is near
@@ -232,9 +242,22 @@ class NewtonState:
         coupled = same and (last or self._same_for >= _SAME) and not (sticks and self._stumbles >= _STUMBLES)
         self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
 
+    def points_at(self, u: Array) -> list[ContactPoints]:
+        """Points at displacement u (3N,), as a search that goes there has them: where gaps no longer change by seeing
+        points afresh, those seen last, moved."""
+        if not self._settled:
+            return self.system.points(u, self.step, self.system.normals(u))
+        return self.system.refreshed(self._moved(u), u, self.step)
+
+    def _moved(self, u: Array) -> list[ContactPoints]:
+        """The points seen last at displacement u (3N,), by the linear model."""
+        return [shifted(p, (u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
+
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:
         """Points after a move: seen afresh until that no longer changes the gaps."""
-        points = [shifted(p, (self.u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
+        points = self._moved(self.u)
+        if np.abs(self.u - self._seen[1]).max(initial=0.0) > _STALE * self.system.reach:
+            self._settled = False
         if not self._settled:
             self._normals = self.system.turned(self._normals, self.u, self._iteration < _TURNING)
             fresh = self.system.points(self.u, self.step, self._normals)
