@@ -255,9 +255,12 @@ class NewtonState:
 
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:
         """Points after a move: seen afresh until that no longer changes the gaps."""
-        points = self._moved(self.u)
-        if np.abs(self.u - self._seen[1]).max(initial=0.0) > _STALE * self.system.reach:
+        stale = self._settled and not all(interface.slides for interface in self.system.interfaces)
+        if stale and np.abs(self.u - self._seen[1]).max() > _STALE * self.system.reach:
             self._settled = False
+            self._seen = (self.system.points(self.u, self.step, self.system.normals(self.u)), self.u)
+            return self._seen[0]
+        points = self._moved(self.u)
         if not self._settled:
             self._normals = self.system.turned(self._normals, self.u, self._iteration < _TURNING)
             fresh = self.system.points(self.u, self.step, self._normals)
