@@ -74,8 +74,7 @@ def length_by_residual(state: NewtonState, move: Array, most: float) -> float:
     length, best = most, (np.inf, most)
     for _ in range(_TRIALS):
         there = state.u + length * move
-        points = state.system.points(there, state.step, state.system.normals(there))
-        contact = state.forces(points, there, ActiveSet.TRIAL, coupled=state.contact.coupled)
+        contact = state.forces(state.points_at(there), there, ActiveSet.TRIAL, coupled=state.contact.coupled)
         left = norm(np.where(state.free, state.pull(there) + contact.forces, 0.0))
         if left < (1.0 - 1e-4 * length) * now:
             return length

@@ -29,6 +29,9 @@ _PLACES = 0.03
 _TURNING = 1
 """Iterations after which normals without known derivatives are frozen; weights are updated until gaps no longer change.
 Both are verified at convergence (``confirmed``)."""
+_STALE = 0.025
+"""Movement of a node since the last search for contact points, over the search distance, from which on points are
+searched again: along a curved surface gaps change with its square."""
 _FIXED_POINT = 8
 """Iterations of the fixed-point phase."""
 _SAME = 2
@@ -185,7 +188,14 @@ class NewtonState:
         """Whether the convergence criteria (6) hold with the current contact points."""
         if not (self.arrived and self._near):
             return False
-        return self._quiet or self.system.settled(self.contact, self.states, self._negligible)
+        return self._quiet or (self.system.settled(self.contact, self.states, self._negligible) and self._lawful())
+
+    def _lawful(self) -> bool:
+        """Whether friction acts against slip: what the multipliers took to slide may slide another way by now."""
+        if not any(t.friction.any() for t in self.contact.tractions):
+            return True
+        found = self.forces(self.contact.points, self.u, ActiveSet.TRIAL, coupled=self.contact.coupled)
+        return self.system.settled(found, self.states, self._negligible)
 
     def confirmed(self) -> bool:
         """Whether contact points, searched again at u, agree with the current ones.
@@ -243,9 +253,23 @@ class NewtonState:
         coupled = same and (last or self._same_for >= _SAME) and not (sticks and self._stumbles >= _STUMBLES)
         self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
 
+    def points_at(self, u: Array) -> list[ContactPoints]:
+        """Points at displacement u (3N,), as a search that goes there has them: where gaps no longer change by seeing
+        points afresh, those seen last, moved."""
+        if not self._settled:
+            return self.system.points(u, self.step, self.system.normals(u))
+        return self.system.refreshed(self._moved(u), u, self.step)
+
+    def _moved(self, u: Array) -> list[ContactPoints]:
+        """The points seen last at displacement u (3N,), by the linear model."""
+        return [shifted(p, (u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
+
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:
         """Contact points after a move, searched again until that no longer changes the gaps."""
         points = [shifted(p, (self.u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
+_STALE = 0.025
+"""Movement of a node since the last search for contact points, over the search distance, from which on points are
+searched again: along a curved surface gaps change with its square."""
         if not self._settled:
             self._normals = self.system.turned(self._normals, self.u, self._iteration < _TURNING)
             fresh = self.system.points(self.u, self.step, self._normals)
