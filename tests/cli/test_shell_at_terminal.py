@@ -138,7 +138,6 @@ class Terminal:
             time.sleep(0.01)
         os.write(self._ours, text.encode())
 
-
     def vanish(self) -> None:
         """Close the terminal under the program, which is not its controlling one: no signal tells."""
         os.close(self._ours)
