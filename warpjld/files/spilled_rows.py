@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 from threading import Lock
 
 import numpy as np
@@ -31,6 +32,13 @@ class SpilledRows:
     def __len__(self) -> int:
         return self._count
 
+    def extend_from(self, path: str | Path) -> None:
+        """Add rows from a file that holds them as they lie in memory."""
+        with Path(path).open("rb") as rows:
+            row = 8 * max(self._width, 1)
+            while data := rows.read(max(_IN_MEMORY // row, 1) * row):
+                self.extend(np.frombuffer(data, dtype=np.float64).reshape(-1, self._width))
+
     def extend(self, rows: NDArray[np.float64]) -> None:
         """Add rows, shape (n, width)."""
         with self._lock:
@@ -41,11 +49,11 @@ class SpilledRows:
     def __getitem__(self, rows: slice) -> NDArray[np.float64]:
         """Consecutive rows as a new array, shape (n, width)."""
         start, stop, _ = rows.indices(self._count)
-        size = 8 * self._width
+        size, count = 8 * self._width, max(stop - start, 0)
         with self._lock:
             self._file.seek(start * size)
-            data = self._file.read(max(stop - start, 0) * size)
-        return np.frombuffer(data, dtype=np.float64).reshape(-1, self._width).copy()
+            data = self._file.read(count * size)
+        return np.frombuffer(data, dtype=np.float64).reshape(count, self._width).copy()
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
         """All rows, some at a time."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.files.spilled_rows import SpilledRows
 from warpjld.geometry.rotations import upright
 from warpjld.geometry.scales import polar
 from warpjld.motion.clip import Clip, streamed_clip
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 else:
     transform = lazy_module("scipy.spatial.transform")
 
-__all__ = ["JointAnimation", "StreamedAnimation", "streamed_animation"]
+__all__ = ["JointAnimation", "StreamedAnimation", "spilled_animation", "streamed_animation"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,3 +138,14 @@ class StreamedAnimation(JointAnimation):
 def streamed_animation(count: int, made: Callable[[slice], JointAnimation]) -> JointAnimation:
     """An animation of F frames: made at once where they are a block or less, streamed where they are more."""
     return made(slice(0, count)) if count <= BLOCK else StreamedAnimation(made(slice(0, 1)), count, made)
+
+
+def spilled_animation(head: JointAnimation, rows: SpilledRows) -> JointAnimation:
+    """An animation whose transforms were read one block after another, each frame a row of N × 16 numbers.
+
+    Args:
+        head: What is not an array of frames.
+        rows: The frames.
+    """
+    shape = (-1, len(head.tree), 4, 4)
+    return streamed_animation(len(rows), lambda frames: replace(head, worlds=rows[frames].reshape(shape)))

@@ -10,7 +10,7 @@ from warpjld.fem.contact import ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct_frames import CorrectedFrame
+from warpjld.simulation.grip.correct_frames import CorrectedDigit
 from warpjld.simulation.grip.find import FoundGrip
 from warpjld.simulation.solve.bone_clearance import TightBone
 from warpjld.simulation.solve.force_limit import Stop
@@ -48,7 +48,8 @@ class SolveResult:
         missed: Touches between frames that no frame shows.
         edits: Angles that searches and corrections gave, in order.
         grips: What came of searches for a grip.
-        corrections: What came of corrections.
+        corrected: Digits that corrections opened.
+        uncorrected: What they could not, in words.
         stops: Digits that closed no farther.
         tight: Bones that came nearest to objects, of every digit and object the nearest.
         equilibria: Of each frame that this run solved, by its number: what it can be differentiated from.
@@ -64,7 +65,8 @@ class SolveResult:
     missed: tuple[MissedContact, ...] = ()
     edits: tuple[AngleEdit, ...] = ()
     grips: tuple[FoundGrip, ...] = ()
-    corrections: tuple[CorrectedFrame, ...] = ()
+    corrected: tuple[CorrectedDigit, ...] = ()
+    uncorrected: tuple[str, ...] = ()
     stops: tuple[Stop, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
