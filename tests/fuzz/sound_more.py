@@ -17,8 +17,8 @@ from warpjld.cli import command_group
 from warpjld.covering import bind_rig
 from warpjld.covering.kept import load_binding, save_binding
 from warpjld.errors import InputError
-from warpjld.io.points_file import read_points_file, write_points_file
 from warpjld.io.mesh_file import read_mesh
+from warpjld.io.points_file import read_points_file, write_points_file
 from warpjld.motion.animations import animation_names
 from warpjld.rig import Rig
 from warpjld.script.pose_files import load_pose
