@@ -138,6 +138,10 @@ class Terminal:
             time.sleep(0.01)
         os.write(self._ours, text.encode())
 
+    def vanish(self) -> None:
+        """Close the terminal under the program, which is not its controlling one: no signal tells."""
+        os.close(self._ours)
+
 
 @pytest.fixture
 def shell(tmp_path: Path) -> Iterator[Terminal]:
@@ -169,5 +173,15 @@ def test_a_session_that_is_told_to_end_keeps_its_lines(tmp_path: Path, shell: Te
     shell.type("PRINT 'here'\r")
     shell.wait("here", 2)
     shell.process.send_signal(signal.SIGHUP)
+    assert shell.process.wait(30) == 130
+    assert (tmp_path / "out" / "autosaved.jld").read_text() == "RATE 25\n"
+
+
+def test_a_session_ends_with_its_terminal_and_keeps_its_lines(tmp_path: Path, shell: Terminal) -> None:
+    shell.wait("QUIT leaves.")
+    shell.type("RATE 25\r")
+    shell.type("PRINT 'here'\r")
+    shell.wait("here", 2)
+    shell.vanish()
     assert shell.process.wait(30) == 130
     assert (tmp_path / "out" / "autosaved.jld").read_text() == "RATE 25\n"

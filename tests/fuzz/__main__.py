@@ -22,7 +22,8 @@ from tests.fuzz.worker import SECONDS, forked
 
 __all__ = ["Tally", "fuzz"]
 
-_AT_ONCE = 100  # inputs of one kind before the next has its turn
+_TURN = 4.0
+"""Processor time of one kind before the next has its turn [s]: what is read fast is tried often."""
 
 
 @dataclass
@@ -40,12 +41,12 @@ class Tally:
     memory: int = 0
 
 
-def fuzz(seconds: float, start: int, kinds: list[str], folder: Path, *, at_once: int = _AT_ONCE) -> Tally:
+def fuzz(seconds: float, start: int, kinds: list[str], folder: Path, *, turn: float = _TURN) -> Tally:
     """Try inputs of each kind in turn until the time is up, with seeds from ``start`` on; every kind has one turn."""
     tally, until, number = Tally(), time.monotonic() + seconds, start
     while True:
         for name in kinds:
-            _turn(tally, name, number, at_once, folder)
+            _turn(tally, name, number, turn, folder)
             if time.monotonic() > until and number > start:
                 return tally
         number += 1
@@ -53,9 +54,9 @@ def fuzz(seconds: float, start: int, kinds: list[str], folder: Path, *, at_once:
             return tally
 
 
-def _turn(tally: Tally, name: str, number: int, count: int, folder: Path) -> None:
+def _turn(tally: Tally, name: str, number: int, seconds: float, folder: Path) -> None:
     place = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=folder))
-    code, rows = forked(name, number, count, place)
+    code, rows = forked(name, number, seconds, place)
     found = 0
     for row in rows:
         if "told" in row:
@@ -82,13 +83,14 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=1.0, help="how long")
     parser.add_argument("--seed", type=int, default=1, help="of the first turn; each following one has the next")
     parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), help="only these")
-    parser.add_argument("--at-once", type=int, default=_AT_ONCE, help="inputs of a kind before the next has its turn")
+    parser.add_argument("--turn", type=float, default=_TURN, help="seconds of a kind before the next has its turn")
     given = parser.parse_args()
     os.environ |= {"OMP_NUM_THREADS": "1", "WARPJLD_CACHE": "off"}
     folder = Path(tempfile.mkdtemp(prefix="warpjld-fuzz-"))
-    tally = fuzz(60.0 * given.minutes, given.seed, given.kinds, folder, at_once=given.at_once)
+    tally = fuzz(60.0 * given.minutes, given.seed, given.kinds, folder, turn=given.turn)
     for kind, told, path in tally.found:
         print(f"{kind}: {' | '.join(told.strip().splitlines()[-3:])}\n  {path}")
+    print(", ".join(f"{kind} {count:,}" for kind, count in tally.tried.items()))
     print(
         f"{sum(tally.tried.values()):,} inputs of {len(tally.tried)} kinds, {len(tally.found)} findings, "
         f"at most {tally.memory >> 20} MiB; {folder}"

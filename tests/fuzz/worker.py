@@ -14,7 +14,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
-from hypothesis import strategies as st
 
 from tests.fuzz.damage import damaged
 from tests.fuzz.grammar import scripts
@@ -29,16 +28,17 @@ _WAIT = 10 * SECONDS
 """Seconds by the clock: what waits for others, or for nothing, ends too."""
 MEMORY = 3 << 30
 """Bytes that a process may come to hold."""
+_BATCH = 25  # inputs of one way of making them before the other has its turn
 _ADDRESSES = 8 << 30  # Warp's compiler maps more than it uses
 
 
-def forked(name: str, start: int, count: int, folder: Path) -> tuple[int, list[dict[str, object]]]:
+def forked(name: str, start: int, seconds: float, folder: Path) -> tuple[int, list[dict[str, object]]]:
     """Try inputs in a child of this process, which has imported everything.
 
     Args:
         name: The kind.
         start: Seed.
-        count: How many inputs.
+        seconds: Of processor time, after which no further input is tried.
         folder: Where the input being tried lies, and those of findings.
 
     Returns:
@@ -54,7 +54,7 @@ def forked(name: str, start: int, count: int, folder: Path) -> tuple[int, list[d
             with told.open("w", buffering=1) as out:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
                 os.dup2(os.open(folder / "stderr", os.O_WRONLY | os.O_CREAT), 2)
-                _try_many(name, start, count, folder, lambda row: print(json.dumps(row), file=out))
+                _try_many(name, start, seconds, folder, lambda row: print(json.dumps(row), file=out))
             code = 0
         except BaseException:
             traceback.print_exc()
@@ -66,7 +66,7 @@ def forked(name: str, start: int, count: int, folder: Path) -> tuple[int, list[d
     return os.waitstatus_to_exitcode(status), rows
 
 
-def _try_many(name: str, start: int, count: int, folder: Path, tell: Callable[[dict[str, object]], None]) -> None:
+def _try_many(name: str, start: int, seconds: float, folder: Path, tell: Callable[[dict[str, object]], None]) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
     path = sound(name, folder)
@@ -91,26 +91,28 @@ def _try_many(name: str, start: int, count: int, folder: Path, tell: Callable[[d
             shutil.copy(path, kept)
             tell({"input": str(kept), "told": told})
 
-    how = settings(
-        max_examples=count,
-        database=None,
-        deadline=None,
-        phases=[Phase.generate],
-        suppress_health_check=list(HealthCheck),
-    )
-    drawn = st.randoms(use_true_random=True).map(lambda draw: damaged(data, draw))
-    if name == "a.jld":
-        drawn = st.one_of(drawn, scripts().map(lambda text: text.encode("utf-8", "surrogatepass")))
-
-    @seed(start)
-    @how
-    @given(drawn)
-    def run(content: bytes) -> None:
-        attempt(content)
-
-    random.seed(start)
-    run()
+    until, batch = _spent() + seconds, 0
+    while _spent() < until:  # always the same inputs, of which a faster machine tries more
+        for k in range(_BATCH):
+            if _spent() < until:
+                attempt(damaged(data, random.Random(f"{start} {batch} {k}")))
+        if name == "a.jld":
+            _by_grammar(1000 * start + batch, lambda text: attempt(text.encode("utf-8", "surrogatepass")))
+        batch += 1
     tell({"tried": tried_so_far, "memory": _held()})
+
+
+def _by_grammar(number: int, attempt: Callable[[str], None]) -> None:
+    """Try scripts of the language's own grammar."""
+    every, phases = list(HealthCheck), [Phase.generate]
+    how = settings(max_examples=_BATCH, database=None, deadline=None, phases=phases, suppress_health_check=every)
+    seed(number)(how(given(scripts())(attempt)))()
+
+
+def _spent() -> float:
+    """Processor time of this process and those that it started [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def _held() -> int:

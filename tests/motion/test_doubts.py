@@ -12,6 +12,7 @@ from tests.motion.skeletons import body, rig
 from tests.motion.test_conventions import CONVENTIONS, play
 from warpjld.io import load_rig
 from warpjld.motion import load_motion
+from warpjld.motion.clip import Clip
 from warpjld.motion.doubts import doubts_of_own_joints, jumps
 from warpjld.motion.joint_animation import JointAnimation
 from warpjld.skeleton.recognise.tree import SourceTree
@@ -53,11 +54,18 @@ def test_flips_are_named_with_joint_and_frames_before_resampling(tmp_path: Path)
         assert warnings == ("mixamorig:Head turns by 100° from frame 1 to 2 of the recording: a flip?",)
 
 
+def _turning(turns: np.ndarray) -> Clip:
+    """Joints j0, j1, … without parents that turn so, (F, J, 4)."""
+    frames, count, _ = turns.shape
+    places = np.zeros((frames, count, 3))
+    return Clip(tuple(f"j{k}" for k in range(count)), np.full(count, -1), places[0], places, turns, 30.0)
+
+
 def test_flips_do_not_hang_on_signs_or_on_the_parents_turn() -> None:
     turns = Rotation.from_euler("y", [[0.0], [60.0], [120.0], [180.0], [240.0], [300.0]], degrees=True).as_quat()
-    assert jumps(["a"], turns[:, None] * np.array([1, -1, 1, -1, 1, -1])[:, None, None]) == []
-    assert jumps(["a"], turns[::2, None]) == ["a turns by 120° from frame 0 to 1 of the recording: a flip?"]
-    many = jumps([f"j{k}" for k in range(9)], np.repeat(turns[::2, None], 9, axis=1))
+    assert jumps(_turning(turns[:, None] * np.array([1, -1, 1, -1, 1, -1])[:, None, None])) == []
+    assert jumps(_turning(turns[::2, None])) == ["j0 turns by 120° from frame 0 to 1 of the recording: a flip?"]
+    many = jumps(_turning(np.repeat(turns[::2, None], 9, axis=1)))
     assert len(many) == 5
     assert many[-1] == "so do j4…j8, by more than 90° from one frame to the next"
 

@@ -132,6 +132,31 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 
 
 @pytest.mark.slow
+def test_corrections_are_kept_in_a_state_and_gone_on_from(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    lines = PLATE + "STRENGTH LEFT INDEX 1\nSQUEEZE 5 8 LEFT 2.5\nPRESS 2 8 EVERY 2 CORRECT STATE 's.npz'"
+    for name in ("whole", "cut"):
+        (tmp_path / name).mkdir()
+    whole = solved(run(lines), tmp_path / "whole")
+    assert whole.solved.corrected
+
+    def cut(what: str, done: int, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    scene = run(lines)
+    before = run_contact(scene, tmp_path / "cut", progress=cut)
+    assert before.solved.interrupted
+    assert (tmp_path / "cut" / "s.npz").exists()
+    after = run_contact(run(lines), tmp_path / "cut")
+    assert after.solved.resumed == 2
+    assert after.solved.corrected == whole.solved.corrected
+    assert after.solved.edits == whole.solved.edits
+    assert after.verdict.content() == whole.verdict.content()
+    for one, other in zip(after.solved.frames, whole.solved.frames, strict=True):
+        np.testing.assert_array_equal(one.displacement, other.displacement)
+
+
+@pytest.mark.slow
 def test_a_load_that_opening_cannot_lessen_is_named(run: Callable[[str], Scene], tmp_path: Path) -> None:
     """The hand as a whole is moved down on the plate: no joint has closed."""
     scene = run(
@@ -177,7 +202,6 @@ def test_what_is_too_heavy_is_said(
     ("lines", "message"),
     [
         ("LIFT 15 19 LEFT BALL\nPRESS 0 16", r"frames must lie in those of PRESS, after 0 and up to 16"),
-        ("PRESS 0 19 CORRECT STATE 's.npz'", r"STATE keeps no corrections"),
         ("LIFT 15 19 LEFT BALL\nPRESS 0 19 METHOD PAPER", r"knows no friction"),
         (
             "POINTS BALL top UPPER Y 0.1\nVECTOR BALL top AT 0 0 0 0\nLIFT 15 19 LEFT BALL\nPRESS 0 19",

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import io
+import os
+import select
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -77,6 +81,7 @@ def _converse(session: Session, script: Path | None) -> None:
     for name in _ENDS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _end)
+    _watch_terminal()
     goes_on = True
     try:
         if script is not None:
@@ -89,7 +94,8 @@ def _converse(session: Session, script: Path | None) -> None:
         sys.exit(130)
     finally:
         if kept := _kept(session):
-            click.echo(f"not saved{kept}", err=True)
+            with suppress(OSError):  # the terminal may be gone
+                click.echo(f"not saved{kept}", err=True)
 
 
 def _guarded(session: Session, act: Callable[[], object]) -> bool:
@@ -115,6 +121,21 @@ def _kept(session: Session) -> str:
     """Autosave; text about the file, to append to a message, empty if there are no unsaved lines."""
     kept = session.autosave()
     return "" if kept is None else f"; the lines typed so far are in {kept}"
+
+
+def _watch_terminal() -> None:
+    """Send this process SIGHUP when its terminal is gone: the system does so only where the terminal controls the
+    process, and prompt_toolkit reads one that is gone again and again."""
+    if not (hasattr(select, "poll") and hasattr(signal, "SIGHUP")):
+        return
+    terminal = select.poll()
+    terminal.register(sys.stdin, 0)  # hanging up is always told
+
+    def wait() -> None:
+        if any(told & select.POLLHUP for _, told in terminal.poll()):
+            os.kill(os.getpid(), signal.SIGHUP)
+
+    threading.Thread(target=wait, daemon=True, name="terminal").start()
 
 
 def _end(number: int, frame: object) -> NoReturn:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import codecs
+import io
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
 from warpjld.errors import InputError
-from warpjld.files.input_file import read_bytes
+from warpjld.files.input_file import open_input, read_bytes
 from warpjld.files.nesting import nesting
 from warpjld.limits import check_limit
 
-__all__ = ["parse_json", "read_json", "read_text"]
+__all__ = ["parse_json", "read_json", "read_text", "text_lines"]
 
 
 def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "strict") -> str:
@@ -35,6 +37,22 @@ def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "stric
         kind = "UTF-16" if wide else "UTF-8"
         raise InputError(f"is not {kind} text (byte {error.start})", path=path) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def text_lines(path: str | Path) -> Iterator[str]:
+    """Lines of a text as ``read_text`` has it, read as they are asked for; what is no such text is replaced.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    with open_input(path) as raw:
+        wide = raw.peek(2)[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # type: ignore[attr-defined]
+        with io.TextIOWrapper(raw, "utf-16" if wide else "utf-8-sig", errors="replace", newline=None) as text:
+            try:
+                for line in text:
+                    yield line.removesuffix("\n")
+            except OSError as error:
+                raise InputError(f"cannot be read: {error.strerror}", path=path) from None
 
 
 def read_json(path: str | Path) -> Any:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.files.spilled_rows import SpilledRows
 from warpjld.geometry.rotations import multiply, rotate
 from warpjld.limits import check_limit
 from warpjld.motion.bvh_lines import NAMED, BvhLines
-from warpjld.motion.clip import Clip
+from warpjld.motion.clip import Clip, streamed_clip
 
 __all__ = ["read_bvh"]
 
@@ -52,7 +53,7 @@ def read_bvh(path: str | Path) -> Clip:
     lines = BvhLines(path)
     joints = _hierarchy(lines)
     values, rate, notes = _motion(lines, sum(len(joint.channels) for joint in joints))
-    return replace(_clip(joints, values, rate, notes), warnings=tuple(_doubts(joints, values, rate)))
+    return _clip(joints, values, rate, notes, tuple(_doubts(joints, values, rate)))
 
 
 def _hierarchy(lines: BvhLines) -> list[_Joint]:
@@ -102,7 +103,7 @@ def _channels(lines: BvhLines, words: list[str], joint: str) -> list[tuple[str, 
     return [_CHANNELS[name.lower()] for name in names]
 
 
-def _motion(lines: BvhLines, channels: int) -> tuple[NDArray[np.float64], float, list[str]]:
+def _motion(lines: BvhLines, channels: int) -> tuple[SpilledRows, float, list[str]]:
     """Rows of channel values, frames a second, and notes on a wrong number of rows."""
     if channels == 0:
         raise lines.error("no joint has CHANNELS: nothing moves")
@@ -121,33 +122,34 @@ def _motion(lines: BvhLines, channels: int) -> tuple[NDArray[np.float64], float,
     if len(rows) != count:
         notes.append(f"the motion has {len(rows)} frames, not the {count} it announces: those that are there are taken")
     rate = 1.0 / seconds
-    return np.array(rows), round(rate, 3) if rate > _SLOWEST else rate, notes
+    return rows, round(rate, 3) if rate > _SLOWEST else rate, notes
 
 
-def _rows(lines: BvhLines, channels: int, count: int) -> tuple[list[NDArray[np.float64]], list[str]]:
+def _rows(lines: BvhLines, channels: int, count: int) -> tuple[SpilledRows, list[str]]:
     """Channel values of every frame, and notes; line breaks are ignored if the numbers fill all frames exactly."""
-    rows: list[NDArray[np.float64]] = []
+    rows = SpilledRows(channels)
     notes: list[str] = []
     words_next = lines.next_or_none()
     while words_next is not None:
         words, line = words_next, lines.number
         words_next = lines.next_or_none()
-        if words_next is None and rows and len(words) < channels:
+        if words_next is None and len(rows) and len(words) < channels:
             notes.append(f"the last frame is cut off and left out: {len(words)} of {channels} numbers")
             break
-        if len(words) != channels and not rows:
+        if len(words) != channels and not len(rows):
             first = len(words)
             while words_next is not None and len(words) < count * channels:
                 words += words_next
                 words_next = lines.next_or_none()
             if len(words) == count * channels and words_next is None:
-                return list(lines.numbers(words, len(words), "frames").reshape(count, channels)), notes
+                rows.extend(lines.numbers(words, len(words), "frames").reshape(count, channels))
+                return rows, notes
             lines.number = line
             raise lines.error(f"frame 0: want {channels} numbers, got {first}")
         after, lines.number = lines.number, line
-        rows.append(lines.numbers(words, channels, f"frame {len(rows)}"))
+        rows.extend(lines.numbers(words, channels, f"frame {len(rows)}")[None])
         lines.number = after
-    if not rows:
+    if not len(rows):
         raise lines.error(f"the file ends here; expected frame 0 of {count}")
     return rows, notes
 
@@ -158,15 +160,15 @@ def _count(word: str) -> int | None:
     return int(whole[1]) if whole else None
 
 
-def _doubts(joints: list[_Joint], values: NDArray[np.float64], rate: float) -> list[str]:
+def _doubts(joints: list[_Joint], values: SpilledRows, rate: float) -> list[str]:
     """Warnings about values that are ignored or implausible."""
     found = []
     kinds = [(joint.name, kind) for joint in joints for kind, _ in joint.channels]
-    scaled = [
-        name
-        for (name, kind), column in zip(kinds, values.T, strict=True)
-        if kind == "scale" and np.ptp(column) > 1e-3 * np.abs(column).max()
-    ]
+    scales = [column for column, (_, kind) in enumerate(kinds) if kind == "scale"]
+    spans = [[np.min(some, axis=0), np.max(some, axis=0)] for block in values.blocks() for some in (block[:, scales],)]
+    low, high = np.min([a for a, _ in spans], axis=0), np.max([b for _, b in spans], axis=0)
+    moving = high - low > 1e-3 * np.maximum(np.abs(low), np.abs(high))
+    scaled = [kinds[column][0] for column, moves in zip(scales, moving, strict=True) if moves]
     if scaled:
         found.append(f"the motion scales {', '.join(dict.fromkeys(scaled))}: scale is not followed")
     if len(values) > 1 and not _SLOWEST < rate < _FASTEST:
@@ -174,44 +176,70 @@ def _doubts(joints: list[_Joint], values: NDArray[np.float64], rate: float) -> l
     return found
 
 
-def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes: list[str]) -> Clip:
-    frames = len(values)
-    parents = np.array([joint.parent for joint in joints], dtype=np.int64)
+def _clip(joints: list[_Joint], values: SpilledRows, rate: float, notes: list[str], warnings: tuple[str, ...]) -> Clip:
+    names, parents = tuple(joint.name for joint in joints), np.array([joint.parent for joint in joints], dtype=np.int64)
     offsets = np.array([np.zeros(3) if joint.offset is None else joint.offset for joint in joints])
-    rest = np.zeros((len(joints), 3))
-    places = np.repeat(offsets[None], frames, axis=0)
-    turns = np.tile([0.0, 0.0, 0.0, 1.0], (frames, len(joints), 1))
+    rest = offsets.copy()
+    for j, parent in enumerate(parents):
+        if parent >= 0:
+            rest[j] += rest[parent]
+    added = _add_to_offsets(joints, values, offsets)
+    if added:
+        notes = [*notes, "positions of joints are taken as additions to their OFFSETs"]
+    told = tuple(notes)
+
+    def some(frames: slice) -> Clip:
+        positions, rotations = _worlds(joints, values[frames], offsets, added=added)
+        return Clip(names, parents, rest, positions, rotations, rate, told, warnings)
+
+    return streamed_clip(len(values), some)
+
+
+def _worlds(
+    joints: list[_Joint], values: NDArray[np.float64], offsets: NDArray[np.float64], *, added: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions (f, B, 3) and rotations (f, B, 4) of all joints."""
+    positions = _places(joints, values, offsets)
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (len(values), len(joints), 1))
+    column = 0
+    for j, joint in enumerate(joints):
+        for kind, axis in joint.channels:
+            if kind == "rotation":
+                rotations[:, j] = multiply(rotations[:, j], _about(axis, values[:, column]))
+            elif kind == "position" and added and joint.parent >= 0:
+                positions[:, j, axis] += offsets[j, axis]
+            column += 1
+        if joint.parent >= 0:
+            positions[:, j] = positions[:, joint.parent] + rotate(rotations[:, joint.parent], positions[:, j])
+            rotations[:, j] = multiply(rotations[:, joint.parent], rotations[:, j])
+    return positions, rotations
+
+
+def _places(joints: list[_Joint], values: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Positions relative to the parent, position channels taken as given, shape (f, B, 3)."""
+    places = np.repeat(offsets[None], len(values), axis=0)
     column = 0
     for j, joint in enumerate(joints):
         for kind, axis in joint.channels:
             if kind == "position":
                 places[:, j, axis] = values[:, column]
-            elif kind == "rotation":
-                turns[:, j] = multiply(turns[:, j], _about(axis, values[:, column]))
             column += 1
-    if _add_to_offsets(joints, places, offsets):
-        for j, joint in enumerate(joints):
-            for axis in (axis for kind, axis in joint.channels if kind == "position" and joint.parent >= 0):
-                places[:, j, axis] += offsets[j, axis]
-        notes = [*notes, "positions of joints are taken as additions to their OFFSETs"]
-    positions, rotations = places.copy(), turns.copy()
-    for j, parent in enumerate(parents):
-        rest[j] = offsets[j]
-        if parent >= 0:
-            rest[j] += rest[parent]
-            positions[:, j] = positions[:, parent] + rotate(rotations[:, parent], places[:, j])
-            rotations[:, j] = multiply(rotations[:, parent], turns[:, j])
-    return Clip(tuple(joint.name for joint in joints), parents, rest, positions, rotations, rate, tuple(notes))
+    return places
 
 
-def _add_to_offsets(joints: list[_Joint], places: NDArray[np.float64], offsets: NDArray[np.float64]) -> bool:
+def _add_to_offsets(joints: list[_Joint], values: SpilledRows, offsets: NDArray[np.float64]) -> bool:
     """Whether position channels below the root add to the OFFSET, as Blender writes them."""
     inner = [
         j for j, joint in enumerate(joints) if joint.parent >= 0 and any(k == "position" for k, _ in joint.channels)
     ]
-    as_given = np.linalg.norm(places[:, inner] - offsets[inner], axis=-1).sum()
-    added = np.linalg.norm(places[:, inner], axis=-1).sum()
-    return bool(added < as_given)
+    if not inner:
+        return False
+    as_given = added = 0.0
+    for block in values.blocks():
+        places = _places(joints, block, offsets)[:, inner]
+        as_given += float(np.linalg.norm(places - offsets[inner], axis=-1).sum())
+        added += float(np.linalg.norm(places, axis=-1).sum())
+    return added < as_given
 
 
 def _about(axis: int, degrees: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.files.text_file import read_text
+from warpjld.files.text_file import text_lines
 
 __all__ = ["NAMED", "BvhLines"]
 
@@ -27,7 +27,7 @@ class BvhLines:
 
     def __init__(self, path: str | Path) -> None:
         self.path = path
-        lines = enumerate(read_text(path, errors="replace").split("\n"), start=1)  # not splitlines: form feeds
+        lines = enumerate(text_lines(path), start=1)
         words = ((number, _COMMENT.sub("", line).replace("\0", "").split()) for number, line in lines)
         self._rest: Iterator[tuple[int, list[str]]] = _statements((n, w) for n, w in words if w)
         self.number = 0

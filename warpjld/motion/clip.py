@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +12,9 @@ from numpy.typing import NDArray
 from warpjld.geometry.rotations import conjugate, multiply, rotate, slerp
 from warpjld.limits import check_limit
 from warpjld.motion.frame_times import frame_times
+from warpjld.skeleton.streamed_poses import BLOCK, HeldBlock
 
-__all__ = ["Clip"]
+__all__ = ["Clip", "StreamedClip", "streamed_clip"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +44,49 @@ class Clip:
     def __len__(self) -> int:
         return len(self.positions)
 
+    def __getitem__(self, frames: slice) -> Clip:
+        return replace(self, positions=self.positions[frames], rotations=self.rotations[frames])
+
+    def stating(self, *, rate: float | None = None, notes: tuple[str, ...], warnings: tuple[str, ...] = ()) -> Clip:
+        """The same frames, played at another rate where one is given, with other notes and warnings."""
+        return replace(self, rate=self.rate if rate is None else rate, notes=notes, warnings=warnings)
+
+    def plain(self) -> Clip:
+        """The same frames as arrays."""
+        return self
+
+    def blocks(self) -> Iterator[Clip]:
+        """Blocks of frames, one after another, of which no more than one need be held."""
+        for start in range(0, len(self), BLOCK):
+            yield self[start : start + BLOCK]
+
+    def each(self, found: Callable[[Clip], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """What is found in blocks of frames, one below the other."""
+        return np.concatenate([found(block) for block in self.blocks()])
+
+    def mapped(self, changed: Callable[[Clip], Clip]) -> Clip:
+        """A clip of as many frames, each of which follows from that frame alone."""
+        return streamed_clip(len(self), lambda frames: changed(self[frames].plain()))
+
     def at_rate(self, rate: float) -> Clip:
         """The same motion at another rate: rotations interpolated spherically, positions linearly."""
         if rate == self.rate or len(self) < 2:
-            return replace(self, rate=rate)
+            return self.stating(rate=rate, notes=self.notes, warnings=self.warnings)
         times = np.arange(len(self)) / self.rate
-        at = frame_times(0.0, times[-1], rate)
-        check_limit("transforms", len(at) * len(self.names))
-        flat = self.positions.reshape(len(self), -1)
-        positions = np.stack([np.interp(at, times, column) for column in flat.T], axis=-1)
-        return replace(
-            self,
-            positions=positions.reshape(len(at), *self.positions.shape[1:]),
-            rotations=slerp(times, self.rotations, at),
-            rate=rate,
-        )
+        wanted = frame_times(0.0, times[-1], rate)
+        check_limit("transforms", len(wanted) * len(self.names))
+
+        def resampled(frames: slice) -> Clip:
+            at = wanted[frames]
+            first = max(int(np.searchsorted(times, at[0], side="right")) - 1, 0)
+            span = slice(min(first, len(times) - 2), max(int(np.searchsorted(times, at[-1], side="right")) + 1, 2))
+            some, when = self[span].plain(), times[span]
+            flat = some.positions.reshape(len(some), -1)
+            positions = np.stack([np.interp(at, when, column) for column in flat.T], axis=-1)
+            positions = positions.reshape(len(at), *some.positions.shape[1:])
+            return replace(some, positions=positions, rotations=slerp(when, some.rotations, at), rate=rate)
+
+        return streamed_clip(len(wanted), resampled)
 
     def locals(self) -> NDArray[np.float64]:
         """Rotations of all bones relative to their parents', shape (F, B, 4)."""
@@ -76,17 +107,79 @@ class Clip:
             frame: Number of the frame.
             turns: H, unit quaternions, shape (B, 4).
         """
-        places = self.positions[frame]
+        there = self[frame : frame + 1]
+        places = there.positions[0]
         rest = np.empty_like(self.rest)
         for j, parent in enumerate(self.parents):
             if parent < 0:
                 rest[j] = rotate(conjugate(turns[j]), places[j])
             else:
                 rest[j] = rest[parent] + rotate(conjugate(turns[parent]), places[j] - places[parent])
-        back = multiply(conjugate(self.rotations[frame]), turns)
-        return replace(self, rest=rest, rotations=multiply(self.rotations, back))
+        back = multiply(conjugate(there.rotations[0]), turns)
+        return self.mapped(lambda some: replace(some, rest=rest, rotations=multiply(some.rotations, back)))
 
     def turned_rest(self, turn: NDArray[np.float64]) -> Clip:
         """The same motion with its rest pose rotated as a whole by a quaternion."""
-        rotations = multiply(self.rotations, conjugate(turn))
-        return replace(self, rest=rotate(turn, self.rest), rotations=rotations)
+        rest, back = rotate(turn, self.rest), conjugate(turn)
+        return self.mapped(lambda some: replace(some, rest=rest, rotations=multiply(some.rotations, back)))
+
+
+class StreamedClip(Clip):
+    """A clip whose frames are computed when they are looked at, a block at a time.
+
+    Slices of a block or less are plain clips, longer ones are streamed again. Whoever asks for the arrays themselves
+    gets them whole.
+
+    Args:
+        head: Any of its frames: what is not an array of frames.
+        count: Number of frames.
+        made: A range of its frames; of each the same, whichever others are asked for.
+    """
+
+    _blocks: HeldBlock[Clip]
+
+    def __init__(self, head: Clip, count: int, made: Callable[[slice], Clip]) -> None:
+        stated = {name: getattr(head, name) for name in ("names", "parents", "rest", "rate", "notes", "warnings")}
+        self.__dict__ |= stated | {"_blocks": HeldBlock(count, made)}
+
+    def __len__(self) -> int:
+        return len(self._blocks)
+
+    def __getitem__(self, frames: slice) -> Clip:
+        start, stop, _ = frames.indices(len(self))
+        if stop - start > BLOCK:
+            return StreamedClip(self, stop - start, self._blocks.part(start))
+        return self._like(self._blocks[start:stop])
+
+    def stating(self, *, rate: float | None = None, notes: tuple[str, ...], warnings: tuple[str, ...] = ()) -> Clip:
+        """As of a plain clip."""
+        head = self[:1].stating(rate=rate, notes=notes, warnings=warnings)
+        return StreamedClip(head, len(self), self._blocks.part(0))
+
+    def plain(self) -> Clip:
+        """All frames as arrays."""
+        return self._whole
+
+    @cached_property
+    def _whole(self) -> Clip:
+        return self._like(self._blocks.made(slice(0, len(self))))
+
+    def _like(self, some: Clip) -> Clip:
+        return Clip(
+            self.names, self.parents, self.rest, some.positions, some.rotations, self.rate, self.notes, self.warnings
+        )
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Joint positions, shape (F, B, 3)."""
+        return self._whole.positions
+
+    @property
+    def rotations(self) -> NDArray[np.float64]:
+        """Rotation of every bone from rest, shape (F, B, 4)."""
+        return self._whole.rotations
+
+
+def streamed_clip(count: int, made: Callable[[slice], Clip]) -> Clip:
+    """A clip of F frames: made at once where they are a block or less, streamed where they are more."""
+    return made(slice(0, count)) if count <= BLOCK else StreamedClip(made(slice(0, 1)), count, made)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,27 +27,45 @@ _SHIFTS = 0.01
 _SHOWN = 4  # joints named in one message
 
 
-def jumps(names: Sequence[str], turns: NDArray[np.float64]) -> list[str]:
-    """Warnings about joints that turn by more than 90° between samples, each with the largest jump and its frame.
-
-    Args:
-        names: Names of the joints.
-        turns: Rotations relative to their parents at all samples, unit quaternions, shape (F, J, 4).
-    """
-    if len(turns) < 2:
+def jumps(clip: Clip) -> list[str]:
+    """Warnings about joints that turn by more than 90° against their parent from one frame to the next, each with the
+    largest jump and its frame."""
+    if len(clip) < 2:
         return []
-    steps = _degrees_between(turns[:-1], turns[1:])
-    widest = steps.max(axis=0)
+    widest = np.max([steps.max(axis=0) for steps in _steps(clip)], axis=0)
     found = [int(j) for j in np.argsort(-np.round(widest, 1), kind="stable") if widest[j] > _JUMP]
+    shown = found[:_SHOWN]
+    at = _first_steps(clip, shown, widest[shown] - 0.05)
     lines = [
-        f"{names[j]} turns by {widest[j]:.0f}° from frame {at} to {at + 1} of the recording: a flip?"
-        for j in found[:_SHOWN]
-        for at in (int(np.argmax(steps[:, j] >= widest[j] - 0.05)),)
+        f"{clip.names[j]} turns by {widest[j]:.0f}° from frame {frame} to {frame + 1} of the recording: a flip?"
+        for j, frame in zip(shown, at, strict=True)
     ]
     if len(found) > _SHOWN:
-        others = [names[j] for j in found[_SHOWN:]]
+        others = [clip.names[j] for j in found[_SHOWN:]]
         lines.append(f"so do {_listed(others)}, by more than {_JUMP:.0f}° from one frame to the next")
     return lines
+
+
+def _steps(clip: Clip) -> Iterator[NDArray[np.float64]]:
+    """Rotations [°] of all joints, relative to their parents, from one frame to the next, some frames at a time."""
+    last = clip[:0].locals()
+    for block in clip.blocks():
+        turns = np.concatenate([last, block.locals()])
+        last = turns[-1:]
+        if len(turns) > 1:
+            yield _degrees_between(turns[:-1], turns[1:])
+
+
+def _first_steps(clip: Clip, joints: list[int], least: NDArray[np.float64]) -> list[int]:
+    """The first frame of each of some joints from which it turns by as much to the next."""
+    out = [-1] * len(joints)
+    start = 0
+    for steps in _steps(clip) if joints else ():
+        wide = steps[:, joints] >= least
+        for k in np.flatnonzero(wide.any(axis=0)).tolist():
+            out[k] = start + int(wide[:, k].argmax()) if out[k] < 0 else out[k]
+        start += len(steps)
+    return out
 
 
 def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
@@ -59,16 +77,16 @@ def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
         clip: The recording.
         used: Indices of its joints that drive a joint of the rig, or are ancestors of one that does.
     """
-    size = float(np.linalg.norm(np.ptp(clip.positions[0], axis=0)))
+    first = clip[:1]
+    size = float(np.linalg.norm(np.ptp(first.positions[0], axis=0)))
     if len(clip) == 1:
         at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(clip.names), 1))
-        positions = np.concatenate([clip.rest[None], clip.positions])
-        clip = replace(clip, positions=positions, rotations=np.concatenate([at_rest, clip.rotations]))
-    local = clip.locals()
-    angles = _degrees_between(local[:1], local).max(axis=0)
-    above = np.maximum(clip.parents, 0)
-    places = rotate(conjugate(clip.rotations[:, above]), clip.positions - clip.positions[:, above])
-    shifts = np.linalg.norm(places - places[:1], axis=-1).max(axis=0)
+        first = replace(first, positions=clip.rest[None], rotations=at_rest)
+    turned, place = first.locals(), _in_parents(first)
+    angles, shifts = np.zeros(len(clip.names)), np.zeros(len(clip.names))
+    for block in clip.blocks():
+        angles = np.maximum(angles, _degrees_between(turned, block.locals()).max(axis=0))
+        shifts = np.maximum(shifts, np.linalg.norm(_in_parents(block) - place, axis=-1).max(axis=0))
     moved = [
         name
         for j, name in enumerate(clip.names)
@@ -77,6 +95,12 @@ def doubts_of_clip(clip: Clip, used: Collection[int]) -> list[str]:
         and read_name(name).kind != "helper"
     ]
     return [f"the motion moves {_listed(moved)}, which nothing in the rig follows"] if moved else []
+
+
+def _in_parents(clip: Clip) -> NDArray[np.float64]:
+    """Positions of all joints in the axes of their parents' bones, shape (F, B, 3)."""
+    above = np.maximum(clip.parents, 0)
+    return rotate(conjugate(clip.rotations[:, above]), clip.positions - clip.positions[:, above])
 
 
 def doubts_of_own_joints(clip: Clip, followed: Collection[str]) -> list[str]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.motion.joint_animation import JointAnimation
+from warpjld.files.spilled_rows import SpilledRows
+from warpjld.motion.joint_animation import JointAnimation, spilled_animation
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["fbx_animation_names", "read_fbx_animation"]
@@ -62,24 +63,40 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
     if name is None and len(moving) > 1:
         others = ", ".join(f"'{n}'" for n in moving if n != scene.title)
         notes.append(f"animation '{scene.title}' is played; the file also has {others}")
-    worlds = scene.worlds[:, skeleton.nodes] @ skeleton.squared
-    warnings = _turn_flat_ones(worlds, skeleton.tree)
+    rows, told_of = SpilledRows(16 * len(skeleton.tree)), dict[int, str]()
+    before = skeleton.tree.frames
+    for block in scene.worlds.blocks():
+        worlds = block.reshape(-1, len(scene.names), 4, 4)[:, skeleton.nodes] @ skeleton.squared
+        _turn_flat_ones(worlds, skeleton.tree, len(rows), before, told_of)
+        before = worlds[-1]
+        rows.extend(worlds.reshape(len(worlds), -1))
+    warnings = list(told_of.values())
     if any(stack.shapes for stack in scene.stacks if stack.name == scene.title):
         warnings.append("the animation of blend shapes is not followed")
     told = (*notes, *skeleton.notes)
-    return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=told, warnings=tuple(warnings))
+    nothing = np.zeros((0, len(skeleton.tree), 4, 4))
+    head = JointAnimation(skeleton.tree, nothing, scene.rate, scene.title, notes=told, warnings=tuple(warnings))
+    return spilled_animation(head, rows)
 
 
-def _turn_flat_ones(worlds: NDArray[np.float64], tree: SourceTree) -> list[str]:
-    """Replace singular transforms by the joint's previous rotation with a tiny scale, in place; returns warnings."""
+def _turn_flat_ones(
+    worlds: NDArray[np.float64], tree: SourceTree, first: int, before: NDArray[np.float64], told: dict[int, str]
+) -> None:
+    """Replace singular transforms by the joint's previous rotation with a tiny scale, in place.
+
+    Args:
+        worlds: Transforms of some frames, shape (f, N, 4, 4).
+        tree: The joints.
+        first: Number of the first of these frames.
+        before: Transforms of the frame before, shape (N, 4, 4).
+        told: Warnings by joint are added.
+    """
     linear = worlds[..., :3, :3]
     flat = np.abs(np.linalg.det(linear)) <= _FLAT * np.abs(linear).max(axis=(-1, -2)) ** 3
-    notes: dict[int, str] = {}
     for frame, joint in np.argwhere(flat):
-        before = tree.frames[joint] if frame == 0 else worlds[frame - 1, joint]
-        u, _, v = np.linalg.svd(before[:3, :3])
+        last = before[joint] if frame == 0 else worlds[frame - 1, joint]
+        u, _, v = np.linalg.svd(last[:3, :3])
         linear[frame, joint] = _TINY * u @ v
-        notes.setdefault(
-            int(joint), f"joint '{tree.names[joint]}' is scaled to nothing at frame {frame}: not turned then"
+        told.setdefault(
+            int(joint), f"joint '{tree.names[joint]}' is scaled to nothing at frame {first + frame}: not turned then"
         )
-    return list(notes.values())

@@ -14,8 +14,9 @@ from warpjld.geometry.scales import TINY, never_zero
 from warpjld.limits import check_limit
 from warpjld.motion.animations import choose_animation
 from warpjld.motion.frame_times import frame_rate, frame_times, merged_times
-from warpjld.motion.joint_animation import JointAnimation
+from warpjld.motion.joint_animation import JointAnimation, streamed_animation
 from warpjld.runtime.lazily import lazy_module
+from warpjld.skeleton.streamed_poses import BLOCK
 
 if TYPE_CHECKING:
     from warpjld.io.gltf.document import Document
@@ -72,38 +73,59 @@ def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: st
         keys, warnings = _read_channels(document, [document.gltf.animations[n] for n in animations[title]])
         if len(animations[title]) > 1:
             notes = (*notes, f"{len(animations[title])} animations, each of one node, play together")
-        worlds, rate, mirrored = _sample(document, keys, rate)
-        nodes = joint_nodes(document) if document.gltf.skins else list(range(worlds.shape[1]))
-        warnings += mirrored
-        return JointAnimation(
-            joint_tree(document, nodes), worlds[:, nodes], rate, title=title, notes=notes, warnings=tuple(warnings)
-        )
+        at, rate = _frames(document, keys, rate)
+        warnings += _check(document, keys, at)
+        nodes = joint_nodes(document) if document.gltf.skins else list(range(len(document.gltf.nodes)))
+        tree = joint_tree(document, nodes)
+
+        def some(frames: slice) -> JointAnimation:
+            worlds = _worlds(document, keys, at[frames])[0][:, nodes]
+            return JointAnimation(tree, worlds, rate, title=title, notes=notes, warnings=tuple(warnings))
+
+        return streamed_animation(len(at), some)
 
 
-def _sample(document: Document, keys: list[_Keys], rate: float | None) -> tuple[NDArray[np.float64], float, list[str]]:
-    """World transforms of all nodes, shape (F, N, 4, 4), frames a second, and warnings about mirroring scale."""
+def _frames(document: Document, keys: list[_Keys], rate: float | None) -> tuple[NDArray[np.float64], float]:
+    """Times of the frames [s], and frames a second."""
     if not keys:
         raise InputError("its animation moves no joint", path=document.path)
-    times = merged_times(np.concatenate([key.times for key in keys]))
+    distinct = {id(key.times): key.times for key in keys}  # mostly one: nodes that are keyed alike share their times
+    times = merged_times(np.concatenate(list(distinct.values())))
     rate = frame_rate(times) if rate is None else rate
     at = frame_times(times[0], times[-1], rate)
     check_limit("transforms", len(at) * len(document.gltf.nodes), path=document.path)
-    with np.errstate(invalid="ignore", over="ignore"):
-        worlds, mirrored = _worlds(document, keys, at)
-    if not np.isfinite(worlds).all():
-        frame, node = np.argwhere(~np.isfinite(worlds))[0][:2]
-        raise InputError(f"node '{document.name(node)}' is not finite at frame {frame}", path=document.path)
-    return worlds, rate, mirrored
+    return at, rate
+
+
+def _check(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> list[str]:
+    """Warnings about scale that mirrors; InputError where a node is not finite."""
+    mirrored: dict[int, str] = {}
+    for start in range(0, len(at), BLOCK):
+        worlds, found = _worlds(document, keys, at[start : start + BLOCK])
+        if not np.isfinite(worlds).all():
+            frame, node = np.argwhere(~np.isfinite(worlds))[0][:2]
+            raise InputError(f"node '{document.name(node)}' is not finite at frame {start + frame}", path=document.path)
+        for node, frame in found.items():
+            mirrored.setdefault(
+                node,
+                f"node '{document.name(node)}': its scale turns negative at frame {start + frame}: "
+                "joints are placed as the file says, but no flesh is mirrored",
+            )
+    return [mirrored[node] for node in sorted(mirrored)]
 
 
 class _Keys:
     """Keys of one animated property of a node."""
 
-    def __init__(self, document: Document, sampler: Any, node: int, path: str) -> None:
+    def __init__(
+        self, document: Document, sampler: Any, node: int, path: str, known: dict[int, NDArray[np.float64]]
+    ) -> None:
         self.node, self.path = node, path
-        self.times = document.accessor(sampler.input).astype(np.float64).ravel()
+        if sampler.input not in known:
+            known[sampler.input] = document.accessor(sampler.input).astype(np.float64).ravel()
+        self.times = known[sampler.input]
         self.mode = sampler.interpolation or "LINEAR"
-        values = document.accessor(sampler.output).astype(np.float64)
+        values = document.accessor(sampler.output)  # mostly float32: only what is looked at becomes float64
         per_key = 3 if self.mode == "CUBICSPLINE" else 1
         where = f"animation of '{document.name(node)}', {path}"
         if self.mode not in ("LINEAR", "STEP", "CUBICSPLINE"):
@@ -113,51 +135,62 @@ class _Keys:
             raise InputError(f"{where}: want {want} values, got {values.shape}", path=document.path)
         if not (np.isfinite(self.times).all() and np.isfinite(values).all() and (np.diff(self.times) >= 0).all()):
             raise InputError(f"{where}: key times must increase, and all be finite", path=document.path)
-        if path == "rotation" and not (np.linalg.norm(values[per_key // 2 :: per_key], axis=1) > 0.0).all():
+        if path == "rotation" and not (values[per_key // 2 :: per_key] != 0.0).any(axis=1).all():
             raise InputError(f"{where}: a key is no rotation: its quaternion is zero", path=document.path)
         # of keys at one time after rounding to float32 the last is kept
         last = np.append(np.diff(self.times) > 0.0, True)
-        self.values = values.reshape(len(self.times), per_key, _PATHS[path])[last]
-        self.times = self.times[last]
+        self.values = values.reshape(len(self.times), per_key, _PATHS[path])
+        self.rounding = 2.0 * _SINGLE * float(np.abs(self.times).max())
+        if not last.all():
+            self.values, self.times = self.values[last], self.times[last]
 
     def __call__(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at times, shape (F, 3) or (F, 4); constant outside the keys."""
-        values = self.values[:, self.values.shape[1] // 2]
+        """Values at increasing times, shape (F, 3) or (F, 4); constant outside the keys."""
+        at = np.clip(at, self.times[0], self.times[-1])
+        # the keys around these times, and one more at both ends: a frame on a key may lie before it by rounding
+        first = max(int(np.searchsorted(self.times, at[0], side="right")) - 2, 0)
+        last = int(np.searchsorted(self.times, at[-1] + self.rounding, side="right")) + 1
+        return self._near(at, self.times[first:last], self.values[first:last].astype(np.float64))
+
+    def _near(
+        self, at: NDArray[np.float64], times: NDArray[np.float64], keys: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        values = keys[:, keys.shape[1] // 2]
         rotation = self.path == "rotation"
         if rotation and self.mode != "CUBICSPLINE":
             values = unit(values)
-        at = np.clip(at, self.times[0], self.times[-1])
-        if len(self.times) == 1:
+        if len(times) == 1:
             out = np.repeat(values, len(at), axis=0)
         elif self.mode == "STEP":
             # key times are rounded to float32: a frame on a key must not be taken as before it
-            rounding = 2.0 * _SINGLE * np.abs(self.times).max()
-            out = values[np.maximum(np.searchsorted(self.times - rounding, at, side="right") - 1, 0)]
+            out = values[np.maximum(np.searchsorted(times - self.rounding, at, side="right") - 1, 0)]
         elif self.mode == "CUBICSPLINE":
-            out = self._cubic(at)
+            out = _cubic(at, times, keys)
         elif rotation:
-            return slerp(self.times, values, at)
+            return slerp(times, values, at)
         else:
-            out = np.stack([np.interp(at, self.times, column) for column in values.T], axis=-1)
+            out = np.stack([np.interp(at, times, column) for column in values.T], axis=-1)
         return unit(out) if rotation else np.asarray(out)
 
-    def _cubic(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
-        k = np.clip(np.searchsorted(self.times, at, side="right") - 1, 0, len(self.times) - 2)
-        length = (self.times[k + 1] - self.times[k])[:, None]
-        u = (at - self.times[k])[:, None] / length
-        start, leaving = self.values[k, 1], self.values[k, 2]
-        arriving, end = self.values[k + 1, 0], self.values[k + 1, 1]
-        return np.asarray(
-            (2 * u**3 - 3 * u**2 + 1) * start
-            + (u**3 - 2 * u**2 + u) * length * leaving
-            + (3 * u**2 - 2 * u**3) * end
-            + (u**3 - u**2) * length * arriving
-        )
+
+def _cubic(at: NDArray[np.float64], times: NDArray[np.float64], keys: NDArray[np.float64]) -> NDArray[np.float64]:
+    k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    length = (times[k + 1] - times[k])[:, None]
+    u = (at - times[k])[:, None] / length
+    start, leaving = keys[k, 1], keys[k, 2]
+    arriving, end = keys[k + 1, 0], keys[k + 1, 1]
+    return np.asarray(
+        (2 * u**3 - 3 * u**2 + 1) * start
+        + (u**3 - 2 * u**2 + u) * length * leaving
+        + (3 * u**2 - 2 * u**3) * end
+        + (u**3 - u**2) * length * arriving
+    )
 
 
 def _read_channels(document: Document, animations: list[Any]) -> tuple[list[_Keys], list[str]]:
     """Keys of all nodes, and warnings about animated properties that are ignored."""
     keys: dict[tuple[int, str], _Keys] = {}
+    times: dict[int, NDArray[np.float64]] = {}
     left_out: dict[str, None] = {}
     for animation in animations:
         for channel in animation.channels:
@@ -167,12 +200,15 @@ def _read_channels(document: Document, animations: list[Any]) -> tuple[list[_Key
                 continue
             if not (0 <= node < len(document.gltf.nodes) and 0 <= channel.sampler < len(animation.samplers)):
                 raise InputError(f"its animation names node {node} or sampler {channel.sampler}", path=document.path)
-            keys[node, path] = _Keys(document, animation.samplers[channel.sampler], node, path)
+            keys[node, path] = _Keys(document, animation.samplers[channel.sampler], node, path, times)
     return list(keys.values()), [f"the animation of {what} is not followed" for what in left_out]
 
 
-def _worlds(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:
-    """World transforms of all nodes, shape (F, N, 4, 4), as ``JointAnimation.worlds`` has them, and warnings.
+def _worlds(
+    document: Document, keys: list[_Keys], at: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], dict[int, int]]:
+    """World transforms of all nodes, shape (F, N, 4, 4), as ``JointAnimation.worlds`` has them, and the first frame in
+    which each node's scale has another sign than at rest.
 
     Positions are those of the file. Where a scale becomes negative that was not so at rest, axes are computed with
     its sign at rest, since a mirrored frame is no rotation.
@@ -183,24 +219,21 @@ def _worlds(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> t
         by_node.setdefault(key.node, {})[key.path] = key
     local = np.empty((len(at), count, 4, 4))
     held: dict[int, NDArray[np.float64]] = {}
-    warnings: list[str] = []
+    mirrored: dict[int, int] = {}
     for node in range(count):
         local[:, node] = document.local(node)
         if node in by_node:
             local[:, node], turned = _animated(document, node, by_node[node], at)
             if turned is not None:
-                held[node], frame = turned
-                warnings.append(
-                    f"node '{document.name(node)}': its scale turns negative at frame {frame}: "
-                    "joints are placed as the file says, but no flesh is mirrored"
-                )
+                held[node], mirrored[node] = turned
     order = _parents_first(document)
-    worlds = _compose(document, order, local)
-    if held:
-        for node, linear in held.items():
-            local[:, node, :3, :3] = linear
-        worlds[..., :3, :3] = _compose(document, order, local)[..., :3, :3]
-    return worlds, warnings
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused
+        worlds = _compose(document, order, local)
+        if held:
+            for node, linear in held.items():
+                local[:, node, :3, :3] = linear
+            worlds[..., :3, :3] = _compose(document, order, local)[..., :3, :3]
+    return worlds, mirrored
 
 
 def _compose(document: Document, order: list[int], local: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,37 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.geometry.rotations import rotate
+from warpjld.geometry.rotations import rotate, slerp
 from warpjld.skeleton import Skeleton
 
-__all__ = ["IDENTITY", "HandMotion", "HandRecording", "HandTurns", "hand_joints", "root_carried"]
+__all__ = ["IDENTITY", "HandMotion", "HandPart", "HandRecording", "HandTurns", "hand_joints", "root_carried"]
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class HandTurns:
-    """Rotations of a rig's J joints by one recorded hand, at K times.
+class HandPart:
+    """Rotations of a rig's J joints by one recorded hand, at k of its times.
 
     Attributes:
-        joints: Joints of the rig that belong to the hand.
-        local: Rotations relative to the parent's bone, identity for all other joints, shape (K, J, 4).
-        root: Rotation of the root of a rig that consists of this hand, shape (K, 4).
-        displacement: Displacement [m] of such a rig's root from rest, shape (K, 3).
-        moves: Whether ``root`` and ``displacement`` are known.
+        local: Rotations relative to the parent's bone, identity for joints of no hand, shape (k, J, 4).
+        root: Rotation of the root of a rig that consists of this hand, shape (k, 4).
+        displacement: Displacement [m] of such a rig's root from rest, shape (k, 3).
     """
 
-    joints: tuple[int, ...]
     local: NDArray[np.float64]
     root: NDArray[np.float64]
     displacement: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HandTurns:
+    """Rotations of a rig's joints by one recorded hand.
+
+    Attributes:
+        joints: Joints of the rig that belong to the hand.
+        moves: Whether the root's rotation and displacement are known.
+        part: The rotations at a range of the hand's times.
+    """
+
+    joints: tuple[int, ...]
     moves: bool
+    part: Callable[[slice], HandPart]
+
+    def at(self, times: NDArray[np.float64], wanted: NDArray[np.float64]) -> HandPart:
+        """The rotations between the hand's times [s], shape (K,), at increasing ones; held before and after."""
+        last = int(np.searchsorted(times, wanted[-1], side="right")) + 1
+        first = min(max(int(np.searchsorted(times, wanted[0], side="right")) - 1, 0), max(len(times) - 2, 0))
+        span = slice(first, max(last, first + 2))
+        there, when = self.part(span), times[span]
+        displacement = np.stack([np.interp(wanted, when, column) for column in there.displacement.T], axis=-1)
+        return HandPart(slerp(when, there.local, wanted), slerp(when, there.root, wanted), displacement)
 
 
 class HandMotion(Protocol):

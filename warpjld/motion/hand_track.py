@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import conjugate, minimal_rotation, multiply, rotate
 from warpjld.motion.finger_bends import finger_bends, leaning
-from warpjld.motion.hand_motion import IDENTITY, HandTurns, hand_joints, root_carried
+from warpjld.motion.hand_motion import IDENTITY, HandPart, HandTurns, hand_joints, root_carried
 from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton import DIGITS, Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
+from warpjld.skeleton.streamed_poses import BLOCK
 
 if TYPE_CHECKING:
     import scipy.spatial.transform as transform
@@ -100,31 +101,52 @@ class HandTrack:
         fixed = [name for name in palm if name not in _MOBILE]
         palm = fixed if len(fixed) > 4 else palm
         rest = skeleton.rest[[own[name] for name in palm]]
-        places = np.stack([self.points[name] for name in palm], axis=1)
-        spans = np.linalg.svd(places - places.mean(axis=1, keepdims=True), compute_uv=False)
-        thin = spans[:, 1] <= _THIN * spans[:, 0]
-        if thin.any():
-            raise InputError(f"the joints of the palm lie in a line or a point at {self._label(int(thin.argmax()))}")
-        palm_turn, scale = _fit(rest, places)
-        local = np.tile(IDENTITY, (len(self.times), len(skeleton), 1))
-        for digit in DIGITS:
-            _drive_digit(digit, self, skeleton, own, conjugate(palm_turn), local)
-        back = conjugate(palm_turn[0])
-        moved = rotate(back, places.mean(axis=1) - places[0].mean(axis=0)) / scale
-        centre = rest.mean(axis=0)
-        root, displacement = root_carried(skeleton, multiply(back, palm_turn), centre, moved)
-        return HandTurns(tuple(own.values()), local, root, displacement, self.moves)
+        scale = self._scale(palm, rest)
+        start = self._places(palm, slice(0, 1))
+        back, centre = conjugate(_fit(rest, start)[0]), rest.mean(axis=0)
+
+        def part(times: slice) -> HandPart:
+            some, places = self[times], self._places(palm, times)
+            palm_turn = _fit(rest, places)
+            local = np.tile(IDENTITY, (len(some.times), len(skeleton), 1))
+            for digit in DIGITS:
+                _drive_digit(digit, some, skeleton, own, conjugate(palm_turn), local)
+            moved = rotate(back, places.mean(axis=1) - start[0].mean(axis=0)) / scale
+            return HandPart(local, *root_carried(skeleton, multiply(back, palm_turn), centre, moved))
+
+        return HandTurns(tuple(own.values()), self.moves, part)
+
+    def __getitem__(self, times: slice) -> HandTrack:
+        points = {name: place[times] for name, place in self.points.items()}
+        return replace(self, times=self.times[times], points=points, labels=self.labels[times])
+
+    def _places(self, palm: list[str], times: slice) -> NDArray[np.float64]:
+        """Positions of the palm's P joints at k times, shape (k, P, 3)."""
+        return np.stack([self.points[name][times] for name in palm], axis=1)
+
+    def _scale(self, palm: list[str], rest: NDArray[np.float64]) -> float:
+        """Size of the palm, on average over all times, relative to that at rest; InputError where it has no breadth."""
+        sizes = []
+        for first in range(0, len(self.times), BLOCK):
+            places = self._places(palm, slice(first, first + BLOCK))
+            apart = places - places.mean(axis=1, keepdims=True)
+            spans = np.linalg.svd(apart, compute_uv=False)
+            thin = spans[:, 1] <= _THIN * spans[:, 0]
+            if thin.any():
+                where = self._label(first + int(thin.argmax()))
+                raise InputError(f"the joints of the palm lie in a line or a point at {where}")
+            sizes.append(np.linalg.norm(apart, axis=(1, 2)))
+        return float(np.concatenate(sizes).mean() / np.linalg.norm(rest - rest.mean(axis=0)))
 
 
-def _fit(rest: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Least-squares rotations of the rest points onto the places (Kabsch), and the scale of the places."""
+def _fit(rest: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least-squares rotations of the rest points onto the places (Kabsch)."""
     a = rest - rest.mean(axis=0)
     b = places - places.mean(axis=1, keepdims=True)
     u, _, vt = np.linalg.svd(np.einsum("fpi,pj->fij", b, a))
     proper = np.ones(u.shape[:2])
     proper[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    turn = transform.Rotation.from_matrix((u * proper[:, None, :]) @ vt).as_quat()
-    return turn, float(np.linalg.norm(b, axis=(1, 2)).mean() / np.linalg.norm(a))
+    return np.asarray(transform.Rotation.from_matrix((u * proper[:, None, :]) @ vt).as_quat())
 
 
 def _drive_digit(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.geometry.rotations import slerp
 from warpjld.motion.finger_bends import BENDING, FINGERS, bending_side, bent_beyond_limits
 from warpjld.motion.frame_times import frame_times
 from warpjld.motion.hand_motion import IDENTITY, HandMotion, hand_joints
 from warpjld.skeleton import Poses, Skeleton, poses_from_rotations
+from warpjld.skeleton.streamed_poses import streamed_rows
 
 __all__ = ["poses_of_hands"]
 
@@ -61,17 +61,20 @@ def poses_of_hands(
     turns = [hand.turns(skeleton) for hand in known]
     first, last = min(float(hand.times[0]) for hand in known), max(float(hand.times[-1]) for hand in known)
     at = frame_times(first, last, rate)
-    local = np.tile(IDENTITY, (len(at), len(skeleton), 1))
-    root = np.zeros((len(at), 3))
-    for hand, turn in zip(known, turns, strict=True):
-        joints = list(turn.joints)
-        local[:, joints] = slerp(hand.times, turn.local[:, joints], at)
-        if turn.moves and _just_a_hand(skeleton, hand.side):
-            local[:, 0] = slerp(hand.times, turn.root, at)
-            root = np.stack([np.interp(at, hand.times, column) for column in turn.displacement.T], axis=-1)
+
+    def poses(frames: slice) -> Poses:
+        wanted = at[frames]
+        local, root = np.tile(IDENTITY, (len(wanted), len(skeleton), 1)), np.zeros((len(wanted), 3))
+        for hand, turn in zip(known, turns, strict=True):
+            there, joints = turn.at(hand.times, wanted), list(turn.joints)
+            local[:, joints] = there.local[:, joints]
+            if turn.moves and _just_a_hand(skeleton, hand.side):
+                local[:, 0], root = there.root, there.displacement
+        return poses_from_rotations(skeleton, local, root_position=root)
+
     if any(turn.moves for turn in turns) and not _just_a_hand(skeleton, known[0].side):
         notes.append("only fingers follow the recording: where a hand is does not move a rig that is more than one")
-    return poses_from_rotations(skeleton, local, root_position=root), tuple(notes), tuple(warnings)
+    return streamed_rows(len(at), poses), tuple(notes), tuple(warnings)
 
 
 def _just_a_hand(skeleton: Skeleton, side: str | None) -> bool:

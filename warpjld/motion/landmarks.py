@@ -208,5 +208,8 @@ def _most_stretched(clip: Clip) -> NDArray[np.float64]:
     for j, parent in enumerate(clip.parents):
         roots[j] = j if parent < 0 else roots[parent]
     ends = np.setdiff1d(np.arange(len(clip.names)), clip.parents)
-    reach = np.linalg.norm(clip.positions[:, ends] - clip.positions[:, roots[ends]], axis=-1).sum(axis=1)
-    return np.asarray(clip.positions[int(np.argmax(reach >= 0.98 * reach.max()))])
+    reach = clip.each(
+        lambda some: np.linalg.norm(some.positions[:, ends] - some.positions[:, roots[ends]], axis=-1).sum(axis=1)
+    )
+    frame = int(np.argmax(reach >= 0.98 * reach.max()))
+    return np.asarray(clip[frame : frame + 1].positions[0])

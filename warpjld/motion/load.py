@@ -142,10 +142,10 @@ def _animation(path: Path, rig: Rig, rate: float | None, name: str | None) -> Lo
     read: Callable[..., JointAnimation] = imported(_ANIMATIONS[path.suffix.lower()])
     animation = read(path, rate=rate, name=name)
     own = own_poses(animation, rig)
-    clip = replace(animation.clip(), notes=animation.notes)
+    clip = animation.clip().stating(notes=animation.notes)
     # flips are searched at the file's rate: resampling may hide or create them
     recorded = clip if rate is None else read(path, name=name).clip()
-    flips = jumps(recorded.names, recorded.locals())
+    flips = jumps(recorded)
     if own is None:
         moved = _retargeted(clip, rig, animation.rate, flips)
         return replace(moved, warnings=(*animation.warnings, *moved.warnings))
@@ -199,7 +199,7 @@ def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     joined = with_own_joints(rig)
     recording = own_recording(clip if rate is None else clip.at_rate(rate), joined)
     own = None if recording is None else own_poses(recording.animation, joined)
-    flips = jumps(clip.names, clip.locals())
+    flips = jumps(clip)
     if recording is None or own is None:
         return _retargeted(clip, rig, rate, flips)
     note = "the recording is of the rig's own joints: they are moved as it says"

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import about, conjugate, multiply, rotate
 from warpjld.motion.finger_bends import finger_bends
-from warpjld.motion.hand_motion import IDENTITY, HandTurns, hand_joints, root_carried
-from warpjld.motion.mano_rest import MANO_DIGITS, mano_rest
+from warpjld.motion.hand_motion import IDENTITY, HandPart, HandTurns, hand_joints, root_carried
+from warpjld.motion.mano_rest import MANO_DIGITS, ManoRest, mano_rest
 from warpjld.skeleton import Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
 
@@ -100,9 +100,34 @@ class ManoTrack:
         """
         side = self.side or ""
         own, rest = hand_joints(skeleton, side), mano_rest(skeleton, side)
-        count = len(self.times)
+        wrist = skeleton.rest[own["wrist"]]
+        first = None if self.in_rig else (self._palm(slice(0, 1), rest.axes)[0], self._place(slice(0, 1))[0])
+
+        def part(times: slice) -> HandPart:
+            palm, place = self._palm(times, rest.axes), self._place(times)
+            if first is None:
+                turn, moved = palm, place - wrist
+            else:
+                back = conjugate(first[0])
+                turn, moved = multiply(back, palm), rotate(back, place - first[1])
+            return HandPart(self._local(times, skeleton, rest), *root_carried(skeleton, turn, wrist, moved))
+
+        moves = self.orient is not None or self.place is not None
+        return HandTurns(tuple(own.values()), moves, part)
+
+    def _palm(self, times: slice, axes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rotations of the wrist from the rig's axes, shape (k, 4)."""
+        count = len(self.times[times])
+        return multiply(about(np.zeros((count, 3)) if self.orient is None else self.orient[times]), conjugate(axes))
+
+    def _place(self, times: slice) -> NDArray[np.float64]:
+        return np.zeros((len(self.times[times]), 3)) if self.place is None else self.place[times]
+
+    def _local(self, times: slice, skeleton: Skeleton, rest: ManoRest) -> NDArray[np.float64]:
+        """Rotations of all joints relative to their parents' bones, shape (k, J, 4)."""
+        count = len(self.times[times])
         local = np.tile(IDENTITY, (count, len(skeleton), 1))
-        turned = about(self.pose)
+        turned = about(self.pose[times])
         for d in range(len(MANO_DIGITS)):
             world = np.tile(IDENTITY, (count, 1))
             before = world
@@ -112,14 +137,4 @@ class ManoTrack:
                     bone = multiply(multiply(multiply(rest.axes, world), conjugate(rest.axes)), rest.align[m])
                     local[:, rest.joints[m]] = multiply(conjugate(before), bone)
                     before = bone
-        wrist = skeleton.rest[own["wrist"]]
-        palm = multiply(about(np.zeros((count, 3)) if self.orient is None else self.orient), conjugate(rest.axes))
-        place = np.zeros((count, 3)) if self.place is None else self.place
-        if self.in_rig:
-            turn, moved = palm, place - wrist
-        else:
-            turn = multiply(conjugate(palm[0]), palm)
-            moved = rotate(conjugate(palm[0]), place - place[0])
-        root, displacement = root_carried(skeleton, turn, wrist, moved)
-        moves = self.orient is not None or self.place is not None
-        return HandTurns(tuple(own.values()), local, root, displacement, moves)
+        return local

@@ -78,10 +78,17 @@ def mediapipe_hands(content: Any, rate: float | None = None) -> HandRecording:
     Raises:
         InputError: No hand in any frame, or landmarks that are not 21 points, with the frame's number.
     """
-    about = content if isinstance(content, Mapping) else {}
     frames = _frames(content)
+    timed = [f if isinstance(f, Mapping) else {} for f in frames]
+    return _hands(content if isinstance(content, Mapping) else {}, frames, timed, rate)
+
+
+def _hands(
+    about: Mapping[str, Any], frames: Sequence[Any], timed: Sequence[Mapping[str, Any]], rate: float | None
+) -> HandRecording:
+    """Hands of frames, whose times stand in ``timed`` or ``about``."""
     notes: list[str] = []
-    times, rate = stated_times(about, [f if isinstance(f, Mapping) else {} for f in frames], rate, notes)
+    times, rate = stated_times(about, timed, rate, notes)
     seen: list[list[SeenHand]] = []
     for number, frame in enumerate(frames):
         try:
@@ -118,7 +125,7 @@ def mediapipe_arrays(arrays: Mapping[str, NDArray[Any]], rate: float | None = No
         )
     count, hands = points.shape[:2]
     about = {n: array.tolist() for n, array in arrays.items() if n not in (key, *_CONFIDENCE, *_SIDES)}
-    frames: list[dict[str, Any]] = [{key or "landmarks": row} for row in points.tolist()]
+    fields: dict[str, NDArray[Any]] = {key or "landmarks": points}
     for name in (*_CONFIDENCE, *_SIDES):
         if name not in arrays:
             continue
@@ -126,16 +133,34 @@ def mediapipe_arrays(arrays: Mapping[str, NDArray[Any]], rate: float | None = No
         if array.dtype.kind not in "fiuUS":
             raise InputError(f"'{name}': want numbers or text")
         if array.shape[:1] == (count,) and array.shape not in ((hands,), ()):
-            rows = array.tolist()
+            fields[name] = array
         elif name in _SIDES and array.shape in ((), (1,), (hands,)):
-            rows = [np.broadcast_to(array, (hands,)).tolist()] * count
+            fields[name] = np.broadcast_to(array, (count, hands))
         elif name in _CONFIDENCE and array.shape == (count,):
-            rows = array.tolist()
+            fields[name] = array
         else:
             raise InputError(f"'{name}': shape {array.shape} fits neither {count} frames nor {hands} hands")
-        for frame, row in zip(frames, rows, strict=True):
-            frame[name] = row
-    return mediapipe_hands(about | {"frames": frames}, rate)
+    return _hands(about, _ArrayFrames(fields, count), [{}] * count, rate)
+
+
+class _ArrayFrames(Sequence[Any]):
+    """Frames of arrays as JSON would hold them, each made when it is looked at: as objects they are ten times as large.
+
+    Args:
+        fields: Arrays (F, …) by name.
+        count: F.
+    """
+
+    def __init__(self, fields: Mapping[str, Any], count: int) -> None:
+        self._fields, self._count = fields, count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, frame: Any) -> Any:
+        if not 0 <= frame < self._count:
+            raise IndexError
+        return {name: array[frame].tolist() for name, array in self._fields.items()}
 
 
 def _frames(content: Any) -> list[Any]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from warpjld.geometry.scales import polar
 from warpjld.motion.clip import Clip
-from warpjld.motion.joint_animation import JointAnimation
+from warpjld.motion.joint_animation import JointAnimation, streamed_animation
 from warpjld.motion.landmarks import Landmarks
 from warpjld.motion.rest_pose import turn_of_rest
 from warpjld.motion.same_skeleton import match_joints
@@ -95,13 +95,17 @@ def own_recording(clip: Clip, rig: Rig) -> OwnRecording | None:
     if top and not clip.rest[top].any():  # otherwise an extra node of the file, such as Reference, is at the origin
         fit = replace(fit, shift=np.zeros(3))
     own = np.flatnonzero(match >= 0)
-    worlds = _worlds(clip, match[own], fit, rig.placing, rig.source.frames[own])
+    tree, frames_of, placed = _subtree(rig.source, own), rig.source.frames[own], fit
+
+    def some(frames: slice) -> JointAnimation:
+        return JointAnimation(tree, _worlds(clip[frames], match[own], placed, rig.placing, frames_of), clip.rate)
+
     used: set[int] = set()
     for k in match[known].tolist():
         while k >= 0 and k not in used:
             used.add(k)
             k = int(clip.parents[k])
-    return OwnRecording(JointAnimation(_subtree(rig.source, own), worlds, clip.rate), frozenset(used), notes)
+    return OwnRecording(streamed_animation(len(clip), some), frozenset(used), notes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,14 +53,14 @@ _SIDEWAYS = 0.2
 def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Landmarks, tuple[str, ...]]:
     """A recording with a usable rest pose, its landmarks, and notes on what was replaced."""
     marks = _sided_landmarks(clip, side)
-    ways = _ways(marks, clip.positions)
+    ways = _ways_of_frames(marks, clip)
     if ways is None:
         return clip, marks, marks.notes
     why = _arbitrary(clip, marks)
     if why:
         up, lies = _up(clip, ways)
-        frame = _most_like_standing(marks, clip.positions, up)
-        clip = clip.rebased(frame, _turns(marks, clip.positions[frame], up))
+        frame = _most_like_standing(marks, clip, up)
+        clip = clip.rebased(frame, _turns(marks, clip[frame : frame + 1].positions[0], up))
         notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
         marks = _sided_landmarks(clip, side)
         return clip, marks, (*marks.notes, *notes, *lies)
@@ -78,7 +78,7 @@ def _sided_landmarks(clip: Clip, side: str | None) -> Landmarks:
     This occurs in files that a program mirrored: with the sides of the names, knees would bend backwards.
     """
     marks = landmarks_of_clip(clip, side=side)
-    if not _feet_behind(marks, clip.positions):
+    if not _feet_behind(marks, clip):
         return marks
     other = {"left": "right", "right": "left"}
     joints = {".".join([other.get(p, p) for p in name.split(".")]): joint for name, joint in marks.joints.items()}
@@ -86,18 +86,33 @@ def _sided_landmarks(clip: Clip, side: str | None) -> Landmarks:
     return replace(marks, joints=joints, doubts=(*marks.doubts, doubt))
 
 
-def _feet_behind(marks: Landmarks, places: NDArray[np.float64]) -> bool:
+def _feet_behind(marks: Landmarks, clip: Clip) -> bool:
     """Whether feet point backwards relative to the pelvis, on average over all frames."""
-    across, sides = marks.across("hip", places), []
     for side in ("left", "right"):
         toes = (f"{side}.ball", f"{side}.toe3.base", f"{side}.toe1.base")
         toe = next((marks.joints[name] for name in toes if name in marks.joints), None)
         knee, ankle = marks.joints.get(f"{side}.knee"), marks.joints.get(f"{side}.ankle")
-        if across is None or toe is None or knee is None or ankle is None:
+        if marks.across("hip", marks.rest) is None or toe is None or knee is None or ankle is None:
             return False
-        front = np.cross(unit(across), unit(places[:, knee] - places[:, ankle]))
-        sides.append(float((unit(places[:, toe] - places[:, ankle]) * front).sum(-1).mean()))
-    return max(sides) < -_BEHIND
+        joints = toe, knee, ankle
+        if clip.each(lambda some, joints=joints: _forward(marks, some.positions, *joints)).mean() >= -_BEHIND:  # type: ignore[misc]
+            return False
+    return True
+
+
+def _forward(marks: Landmarks, places: NDArray[np.float64], toe: int, knee: int, ankle: int) -> NDArray[np.float64]:
+    """How far a foot points forwards, -1 to 1, shape (F,)."""
+    across = marks.across("hip", places)
+    assert across is not None
+    front = np.cross(unit(across), unit(places[:, knee] - places[:, ankle]))
+    return np.asarray((unit(places[:, toe] - places[:, ankle]) * front).sum(-1))
+
+
+def _ways_of_frames(marks: Landmarks, clip: Clip) -> NDArray[np.float64] | None:
+    """As ``_ways``, of all frames of a recording, shape (F, 3)."""
+    if _ways(marks, marks.rest) is None:
+        return None
+    return clip.each(lambda some: np.asarray(_ways(marks, some.positions)))
 
 
 def _ways(marks: Landmarks, places: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -146,17 +161,30 @@ def _inconsistent(clip: Clip, marks: Landmarks) -> bool:
         for side in ("left", "right")
         if (j := marks.joints.get(f"{side}.{part}", -1)) >= 0 and marks.parents[j] >= 0
     }
-    off = []
-    for parent, child in sorted(ends):
-        wanted = clip.positions[:, child] - clip.positions[:, parent]
-        given = rotate(clip.rotations[:, parent], marks.rest[child] - marks.rest[parent])
-        known = (np.linalg.norm(wanted, axis=1) > 0.0) & (np.linalg.norm(given, axis=1) > 0.0)
-        off += list(_degrees(wanted[known], given[known]))
-    return bool(off) and float(np.median(off)) > _OFF
+    off = clip.each(
+        lambda some: np.concatenate(
+            [np.zeros(0), *(_apart(some, a, b, marks.rest[b] - marks.rest[a]) for a, b in sorted(ends))]
+        )
+    )
+    return bool(len(off)) and float(np.median(off)) > _OFF
 
 
-def _most_like_standing(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> int:
-    """First frame with nearly the best score: straight, upright trunk and legs, and symmetric arms."""
+def _apart(clip: Clip, parent: int, child: int, bone: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles [°] between a bone in the frames and the rest's bone carried by the rotations, where both have lengths."""
+    wanted = clip.positions[:, child] - clip.positions[:, parent]
+    given = rotate(clip.rotations[:, parent], bone)
+    known = (np.linalg.norm(wanted, axis=1) > 0.0) & (np.linalg.norm(given, axis=1) > 0.0)
+    return _degrees(wanted[known], given[known])
+
+
+def _most_like_standing(marks: Landmarks, clip: Clip, up: NDArray[np.float64]) -> int:
+    """First frame with nearly the best score."""
+    score = clip.each(lambda some: _stance(marks, some.positions, up))
+    return int(np.argmax(score <= score.min() + _AS_GOOD))
+
+
+def _stance(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Deviation [°] from standing, shape (F,): straight, upright trunk and legs, and symmetric arms."""
     score = np.zeros(len(places))
     trunk = marks.trunk(places)
     if trunk is not None:
@@ -172,7 +200,7 @@ def _most_like_standing(marks: Landmarks, places: NDArray[np.float64], up: NDArr
             left = unit(across)
             mirrored = upper[1] - 2.0 * left * (left * upper[1]).sum(-1, keepdims=True)
             score += share * _degrees(upper[0], mirrored)
-    return int(np.argmax(score <= score.min() + _AS_GOOD))
+    return score
 
 
 def _turns(marks: Landmarks, places: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -220,7 +248,7 @@ def _frame(across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.f
 
 def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
     """Rotation of a rest pose whose up axis differs from that of the frames, and a note; None if they agree."""
-    at_rest, ways, pelvis = _ways(marks, marks.rest), _ways(marks, clip.positions), marks.pelvis
+    at_rest, ways, pelvis = _ways(marks, marks.rest), _ways_of_frames(marks, clip), marks.pelvis
     if at_rest is None or ways is None or pelvis is None:
         return None, ()
     mean = ways.mean(axis=0)
@@ -230,11 +258,11 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
     if own @ found > 0.5:
         return None, ()
     told = f"stands along {_axis_name(own)} in its rest and along {_axis_name(found)} in its frames"
-    if not _stands(clip.positions, found, own):
+    if not _stands(clip, found, own):
         return None, (f"the recorded figure {told}: it is taken to lie, not to stand",)
     turn = minimal_rotation(own, found)
     if own @ found < -0.5:  # upside down: the rotation axis follows from the frames
-        mean_turn = transform.Rotation.from_quat(clip.rotations[:, pelvis]).mean()
+        mean_turn = transform.Rotation.from_quat(clip.each(lambda some: some.rotations[:, pelvis])).mean()
         fitting = [g for g in transform.Rotation.create_group("O") if g.apply(own) @ found > 0.5]
         turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
     return turn, (f"the recorded figure {told}: the latter is taken as up",)
@@ -248,20 +276,21 @@ def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tup
     """
     found = _signed_axis(ways.mean(axis=0))
     y, z = np.eye(3)[1:]
-    floors = [up for up in (y, z) if _stands(clip.positions, up, found)]
-    if found @ y > 0.5 or not floors or _stands(clip.positions, found, floors[0]):
+    floors = [up for up in (y, z) if _stands(clip, up, found)]
+    if found @ y > 0.5 or not floors or _stands(clip, found, floors[0]):
         return found, ()
     told = f"the recorded figure is along {_axis_name(found)} in its frames, on a floor across {_axis_name(floors[0])}"
     return floors[0], (f"{told}: it is taken not to stand, but to lie or the like",)
 
 
-def _stands(places: NDArray[np.float64], up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+def _stands(clip: Clip, up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     """Whether there is a floor normal to one axis rather than to another.
 
     The lowest joints of a standing figure keep their height, which is near zero or varies along the other axis.
     """
-    size = float(np.linalg.norm(np.ptp(places[0], axis=0))) or 1.0
-    low, across = ((places @ axis).min(axis=1) / size for axis in (up, other))
+    size = float(np.linalg.norm(np.ptp(clip[:1].positions[0], axis=0))) or 1.0
+    axes = np.stack([up, other], axis=-1)
+    low, across = clip.each(lambda some: (some.positions @ axes).min(axis=1)).T / size
     still = float(np.ptp(low)) < 2.0 * _FLOOR
     at_zero = abs(float(np.median(low))) < _FLOOR
     return still and (at_zero or float(np.ptp(across)) > 0.3)

@@ -25,6 +25,7 @@ to the line between the *joints* at its ends in each frame. An unusable rest pos
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ from warpjld.motion.clip import Clip
 from warpjld.motion.landmarks import Landmarks
 from warpjld.motion.pairs import limb_names, pair_joints
 from warpjld.skeleton import Poses, Skeleton, poses_from_rotations
+from warpjld.skeleton.streamed_poses import streamed_rows
 
 __all__ = ["Retargeted", "correspondence", "retarget", "retarget_and_tell"]
 
@@ -88,54 +90,94 @@ def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
             f"no joint of the motion ({_some(clip.names)}) was recognised as one of the rig ({_some(skeleton.names)})"
         )
     axes = _axes(source, target)
-    recorded = multiply(multiply(axes, clip.rotations), conjugate(axes))
-    trunk = _trunk(source, target, recorded)
-    frames = len(clip)
-    world = np.empty((frames, len(skeleton), 4))
-    align = np.empty((len(skeleton), 4))
-    driven = {j: (name, b) for name, (j, b) in pairs.items()}
-    for j in range(len(skeleton)):
-        parent = int(skeleton.parents[j])
-        align[j] = _IDENTITY if parent < 0 else align[parent]
-        if j in trunk:
-            align[j] = _IDENTITY
-            world[:, j] = trunk[j]
-        elif j in driven:
-            name, bone = driven[j]
-            turned = multiply(multiply(axes, _turned(clip, source, name, bone)), conjugate(axes))
-            align[j] = _alignment(name, source, target, axes, align[j])
-            world[:, j] = multiply(turned, align[j])
-        else:
-            world[:, j] = _IDENTITY if parent < 0 else world[:, parent]
-    above = -1 if trunk else int(skeleton.parents[min(j for j, _ in pairs.values())])
-    while above >= 0:  # the forearm above a hand moves with it
-        world[:, above] = world[:, min(driven)]
-        above = int(skeleton.parents[above])
-    local = world.copy()
-    for j in range(len(skeleton)):
-        if skeleton.parents[j] >= 0:
-            local[:, j] = multiply(conjugate(world[:, skeleton.parents[j]]), world[:, j])
-    poses = poses_from_rotations(skeleton, local)
+    follow = _Follow(clip, skeleton, source, target, pairs, axes)
     scale, guessed = _scale(source, target, pairs)
-    poses = Poses(
-        poses.positions + _travel(clip, source, target, pairs, axes, poses, scale), poses.rotations, poses.flexion
-    )
+    travel = _travel(follow, scale)
+
+    def poses(frames: slice) -> Poses:
+        some, there = follow.poses(clip[frames].plain()), travel[frames]
+        return Poses(some.positions + there[:, None], some.rotations, some.flexion)
+
     used = {bone for _, bone in pairs.values()} | {source.last_part(name) for name in pairs if name in source.joints}
-    used |= _trunk_followed(source, target) if trunk else set()
+    used |= _trunk_followed(source, target) if follow.has_trunk else set()
     return Retargeted(
-        poses,
+        streamed_rows(len(clip), poses),
         frozenset(j for bone in used for j in source.path(-1, bone)),
-        (*notes, *_told(clip, skeleton, pairs, trunk, target), *guessed),
+        (*notes, *_told(clip, skeleton, pairs, target, trunk=follow.has_trunk), *guessed),
         source.doubts,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Follow:
+    """How a rig follows a recording, frame by frame.
+
+    Attributes:
+        clip: The recording.
+        skeleton: The rig's skeleton.
+        source: Landmarks of the recording; ``target`` of the rig.
+        pairs: Canonical name → (joint of the rig, joint of the recording).
+        axes: W of the module's docstring, a quaternion.
+    """
+
+    clip: Clip
+    skeleton: Skeleton
+    source: Landmarks
+    target: Landmarks
+    pairs: dict[str, tuple[int, int]]
+    axes: NDArray[np.float64]
+
+    @cached_property
+    def has_trunk(self) -> bool:
+        """Whether both have a trunk."""
+        return bool(self._trunk(self.clip[:1]))
+
+    @cached_property
+    def align(self) -> NDArray[np.float64]:
+        """A of the module's docstring, shape (J, 4)."""
+        align, trunk = np.empty((len(self.skeleton), 4)), self._trunk(self.clip[:1])
+        driven = {j: name for name, (j, _) in self.pairs.items()}
+        for j, parent in enumerate(self.skeleton.parents.tolist()):
+            align[j] = _IDENTITY if parent < 0 or j in trunk else align[parent]
+            if j in driven and j not in trunk:
+                align[j] = _alignment(driven[j], self.source, self.target, self.axes, align[j])
+        return align
+
+    def _trunk(self, clip: Clip) -> dict[int, NDArray[np.float64]]:
+        recorded = multiply(multiply(self.axes, clip.rotations), conjugate(self.axes))
+        return _trunk(self.source, self.target, recorded)
+
+    def poses(self, clip: Clip) -> Poses:
+        """Poses of some frames, with the rig's root at rest."""
+        skeleton, axes, trunk = self.skeleton, self.axes, self._trunk(clip)
+        world = np.empty((len(clip), len(skeleton), 4))
+        driven = {j: (name, b) for name, (j, b) in self.pairs.items()}
+        for j, parent in enumerate(skeleton.parents.tolist()):
+            if j in trunk:
+                world[:, j] = trunk[j]
+            elif j in driven:
+                turned = multiply(multiply(axes, _turned(clip, self.source, *driven[j])), conjugate(axes))
+                world[:, j] = multiply(turned, self.align[j])
+            else:
+                world[:, j] = _IDENTITY if parent < 0 else world[:, parent]
+        above = -1 if trunk else int(skeleton.parents[min(j for j, _ in self.pairs.values())])
+        while above >= 0:  # the forearm above a hand moves with it
+            world[:, above] = world[:, min(driven)]
+            above = int(skeleton.parents[above])
+        local = world.copy()
+        for j, parent in enumerate(skeleton.parents.tolist()):
+            if parent >= 0:
+                local[:, j] = multiply(conjugate(world[:, parent]), world[:, j])
+        return poses_from_rotations(skeleton, local)
 
 
 def _told(
     clip: Clip,
     skeleton: Skeleton,
     pairs: dict[str, tuple[int, int]],
-    trunk: dict[int, NDArray[np.float64]],
     target: Landmarks,
+    *,
+    trunk: bool,
 ) -> list[str]:
     """Notes on which joint drives which, and on limbs and digits of the rig without a counterpart."""
     besides = "besides the trunk " if trunk else ""
@@ -243,28 +285,29 @@ def _turn_about(axis: NDArray[np.float64], start: NDArray[np.float64], end: NDAr
     return np.array([*(np.sin(angle / 2.0) * a), np.cos(angle / 2.0)])
 
 
-def _travel(
-    clip: Clip,
-    source: Landmarks,
-    target: Landmarks,
-    pairs: dict[str, tuple[int, int]],
-    axes: NDArray[np.float64],
-    poses: Poses,
-    scale: float,
-) -> NDArray[np.float64]:
-    """Displacement [m] to add to all joints, shape (F, 1, 3)."""
+def _travel(follow: _Follow, scale: float) -> NDArray[np.float64]:
+    """Displacement [m] to add to all joints, shape (F, 3)."""
+    source, target, pairs = follow.source, follow.target, follow.pairs
     if source.pelvis is not None and target.pelvis is not None:
         joint, bone = target.pelvis, source.pelvis
     else:
         joint, bone = min(pairs.values())
-    moved = scale * rotate(axes, clip.positions[:, bone] - clip.positions[0, bone])
-    travel = (target.rest[joint] - poses.positions[:, joint] + moved)[:, None]
+    tips = {j for name, j in target.joints.items() if ".toe" in name and not name.endswith(".base")}
+    # all joints, as in kneeling or handstands, but toe tips: rigid toes would reach below the floor
+    down = [j for j in range(len(target.rest)) if j not in tips]
+    start = follow.clip[:1].positions[0, bone]
+
+    def found(clip: Clip) -> NDArray[np.float64]:
+        """Displacement, and height of the lowest joint then, shape (f, 4)."""
+        poses = follow.poses(clip)
+        moved = scale * rotate(follow.axes, clip.positions[:, bone] - start)
+        travel = target.rest[joint] - poses.positions[:, joint] + moved
+        return np.column_stack([travel, (poses.positions[:, down, 1] + travel[:, 1:2]).min(axis=1)])
+
+    rows = follow.clip.each(found)
+    travel = rows[:, :3].copy()
     if any(name.endswith(".ankle") for name in pairs):
-        tips = {j for name, j in target.joints.items() if ".toe" in name and not name.endswith(".base")}
-        # all joints, as in kneeling or handstands, but toe tips: rigid toes would reach below the floor
-        down = [j for j in range(len(target.rest)) if j not in tips]
-        heights = (poses.positions[:, down, 1] + travel[..., 1]).min(axis=1)
-        travel[..., 1] += target.rest[down, 1].min() - np.percentile(heights, _GROUND_PERCENTILE)
+        travel[:, 1] += target.rest[down, 1].min() - np.percentile(rows[:, 3], _GROUND_PERCENTILE)
     return travel
 
 

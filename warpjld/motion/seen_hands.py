@@ -22,7 +22,7 @@ _FEW = 0.2
 """Largest share of frames in which a single hand's less frequent label counts as a detection error."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class SeenHand:
     """A hand detected in one frame.
 

@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.files.spilled_rows import SpilledRows
 from warpjld.io.unique_names import unique_names
 from warpjld.limits import check_limit
 from warpjld.motion.animations import choose_animation
 from warpjld.motion.frame_times import frame_times
-from warpjld.motion.joint_animation import JointAnimation
+from warpjld.motion.joint_animation import JointAnimation, spilled_animation
+from warpjld.skeleton.streamed_poses import BLOCK
 
 if TYPE_CHECKING:
-    from warpjld.io.usd.skeletons import UsdSkeleton
+    from warpjld.io.usd.skeletons import UsdSkeleton, UsdSkeletons
     from warpjld.io.usd.stage import UsdFile
 
 __all__ = ["read_usd_animation", "usd_animation_names"]
@@ -68,15 +70,39 @@ def read_usd_animation(path: str | Path, *, rate: float | None = None, name: str
         title, chosen, notes = _chosen(file, found.skeletons, name)
         codes, rate, told = _time_codes(file, found.skeletons, chosen, rate)
         warnings = [*told, *_shapes(chosen)]
-        with np.errstate(invalid="ignore", over="ignore"):
-            worlds = np.concatenate(
-                [_worlds(file, *each, codes, warnings) for each in zip(found.skeletons, chosen, strict=True)], axis=1
-            )
-    if not np.isfinite(worlds).all():
-        frame, joint = np.argwhere(~np.isfinite(worlds))[0][:2]
-        raise InputError(f"joint '{found.tree.names[joint]}' is not finite at frame {frame}", path=file.path)
-    notes = (*notes, *dict.fromkeys(file.notes))
-    return JointAnimation(found.tree, worlds, rate, title, notes, tuple(warnings), file.up)
+        rows, mirrored = _rows(file, found, chosen, codes)
+    notes, nothing = (*notes, *dict.fromkeys(file.notes)), np.zeros((0, len(found.tree), 4, 4))
+    head = JointAnimation(found.tree, nothing, rate, title, notes, (*warnings, *mirrored), file.up)
+    return spilled_animation(head, rows)
+
+
+def _rows(
+    file: UsdFile, found: UsdSkeletons, chosen: list[Any], codes: NDArray[np.float64]
+) -> tuple[SpilledRows, list[str]]:
+    """Joint-to-world transforms of all skeletons at time codes, a row of N × 16 numbers each, and warnings."""
+    rows = SpilledRows(16 * len(found.tree))
+    mirrored: dict[int, str] = {}
+    moving = [len(_moves_at(skeleton.prim)) > 1 for skeleton in found.skeletons]
+    for start in range(0, len(codes), BLOCK):
+        blocks = []
+        for k, (skeleton, animation) in enumerate(zip(found.skeletons, chosen, strict=True)):
+            at = codes[start : start + BLOCK]
+            with np.errstate(invalid="ignore", over="ignore"):
+                worlds, first = _worlds(file, skeleton, animation, at, at if moving[k] else codes[:1])
+            blocks.append(worlds)
+            if first is not None:
+                mirrored.setdefault(
+                    k,
+                    f"joint '{skeleton.tokens[first[1]]}': its scale turns negative at frame {start + first[0]}: "
+                    "joints are placed as the file says, but no flesh is mirrored",
+                )
+        together = np.concatenate(blocks, axis=1)
+        if not np.isfinite(together).all():
+            frame, joint = np.argwhere(~np.isfinite(together))[0][:2]
+            where = f"joint '{found.tree.names[joint]}' is not finite at frame {start + frame}"
+            raise InputError(where, path=file.path)
+        rows.extend(together.reshape(len(together), -1))
+    return rows, [mirrored[k] for k in sorted(mirrored)]
 
 
 def _no_skeleton(file: UsdFile) -> str:
@@ -187,29 +213,26 @@ def _moves_at(prim: Any) -> list[float]:
 
 
 def _worlds(
-    file: UsdFile, skeleton: UsdSkeleton, animation: Any, codes: NDArray[np.float64], warnings: list[str]
-) -> NDArray[np.float64]:
-    """Joint-to-world transforms of a skeleton, shape (F, J, 4, 4), as ``JointAnimation.worlds`` has them."""
+    file: UsdFile, skeleton: UsdSkeleton, animation: Any, codes: NDArray[np.float64], placed_at: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[int, int] | None]:
+    """Joint-to-world transforms of a skeleton, shape (F, J, 4, 4), as ``JointAnimation.worlds`` has them; and the first
+    frame and joint whose scale has another sign than at rest."""
     from pxr import UsdGeom
 
     from warpjld.io.usd.skeletons import concatenated
     from warpjld.io.usd.stage import usd_matrices
 
-    at = codes if len(_moves_at(skeleton.prim)) > 1 else codes[:1]
     places = np.stack(
-        [usd_matrices(UsdGeom.XformCache(t).GetLocalToWorldTransform(skeleton.prim)) for t in at.tolist()]
+        [usd_matrices(UsdGeom.XformCache(t).GetLocalToWorldTransform(skeleton.prim)) for t in placed_at.tolist()]
     )
     local, unmirrored = _locals(file, skeleton, animation, codes)
     worlds = places[:, None] @ concatenated(local, skeleton.parents)
     changed = (unmirrored != local).any(axis=(2, 3))
-    if changed.any():
-        frame, joint = np.argwhere(changed)[0]
-        warnings.append(
-            f"joint '{skeleton.tokens[joint]}': its scale turns negative at frame {frame}: "
-            "joints are placed as the file says, but no flesh is mirrored"
-        )
-        worlds[..., :3, :3] = (places[:, None] @ concatenated(unmirrored, skeleton.parents))[..., :3, :3]
-    return np.asarray(worlds)
+    if not changed.any():
+        return np.asarray(worlds), None
+    frame, joint = np.argwhere(changed)[0].tolist()
+    worlds[..., :3, :3] = (places[:, None] @ concatenated(unmirrored, skeleton.parents))[..., :3, :3]
+    return np.asarray(worlds), (frame, joint)
 
 
 def _locals(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.errors import InputError
-from warpjld.motion.joint_animation import JointAnimation
+from warpjld.motion.joint_animation import JointAnimation, streamed_animation
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["read_vrma"]
@@ -56,7 +56,12 @@ def read_vrma(path: str | Path, *, rate: float | None = None, name: str | None =
     place = {j: k for k, j in enumerate(joints)}
     parents = [next((place[a] for a in animation.tree.ancestors(j) if a in place), -1) for j in joints]
     tree = SourceTree(tuple(_word(chosen[j]) for j in joints), np.array(parents), animation.tree.frames[joints])
-    return replace(animation, tree=tree, worlds=animation.worlds[:, joints])
+
+    def some(frames: slice) -> JointAnimation:
+        block = animation[frames]
+        return replace(block.plain(), tree=tree, worlds=block.worlds[:, joints])
+
+    return streamed_animation(len(animation), some)
 
 
 def _word(joint: str) -> str:

@@ -329,8 +329,7 @@ def _report(
         return None if known is None else joint_slopes(known.model, known.history, known.solution, actor, forces)
 
     verdict = verdict_of(solved, table.rows, table.suggestions(model, slopes), remaining_overlaps(surfaces))
-    corrections = [one.text for one in worst_digits(solved.corrections)]
-    corrections += [text for frame in solved.corrections for text in frame.failed]
+    corrections = [*(one.text for one in worst_digits(solved.corrected)), *solved.uncorrected]
     verdict = replace(
         verdict,
         text="; ".join([verdict.text, *before.notes()]),

@@ -13,7 +13,7 @@ from warpjld.files.reading import reading
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct_frames import CorrectedFrame, correct_frame, uncorrected
+from warpjld.simulation.grip.correct_frames import CorrectedDigit, correct_frame, uncorrected
 from warpjld.simulation.grip.find import FoundGrip, find_grip
 from warpjld.simulation.grip.kept import grip_content, restored_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
@@ -136,7 +136,8 @@ class _Run:
     missed: list[MissedContact] = field(default_factory=list)
     edits: list[AngleEdit] = field(default_factory=list)
     grips: list[FoundGrip] = field(default_factory=list)
-    corrections: list[CorrectedFrame] = field(default_factory=list)
+    corrected: list[CorrectedDigit] = field(default_factory=list)
+    uncorrected: list[str] = field(default_factory=list)
     tight: dict[tuple[str, str, str], tuple[float, TightBone]] = field(default_factory=dict)
     equilibria: dict[float, KnownEquilibrium] = field(default_factory=dict)
     settled: tuple[ContactModel, Checkpoint] | None = None
@@ -153,6 +154,7 @@ class _Run:
     def resume(self, found: Checkpoint, watch: Watch) -> list[str]:
         """Restore a checkpoint, replaying its edits frame by frame; returns the texts that ``watch`` gave."""
         self.last, self.resumed, self.missed = found.solution, len(found.frames), list(found.missed)
+        self.corrected, self.uncorrected = list(found.corrected), list(found.uncorrected)
         self.limits.restore(found.limits)
         self.tight = {(one.actor, one.digit, one.object): (frame, one) for frame, one in found.tight}
         grips, reasons = [restored_grip(content, self.contact) for content in found.grips], []
@@ -205,7 +207,8 @@ class _Run:
                 if before is None
                 else correct_frame(model, self.history, before, solution, strength)
             )
-            self.corrections.append(corrected)
+            self.corrected += corrected.digits
+            self.uncorrected += corrected.failed
             solution = corrected.solution
             self._edit(corrected.edits)
         bare = replace(solution, instants=(replace(solution.last, touches=()),))
@@ -218,8 +221,8 @@ class _Run:
         return None
 
     def save(self, checkpoint: CheckpointFile) -> bool:
-        """Save the solved frames; returns False if there are none, or with corrections, which are not saved."""
-        if self.settled is None or self.request.correct:
+        """Save the solved frames; returns False if there are none."""
+        if self.settled is None:
             return False
         checkpoint.save(self.settled[1])
         return True
@@ -230,6 +233,7 @@ class _Run:
             self.model, known = self.settled
             self.done, self.edits, self.missed = list(known.frames), list(known.edits), list(known.missed)
             self.grips, self.edited = self.grips[: len(known.grips)], list(known.edited)
+            self.corrected, self.uncorrected = list(known.corrected), list(known.uncorrected)
         after = self.done[-1].frame
         return replace(self.ended(SolveStatus.STOPPED, f"interrupted after frame {after:g}"), interrupted=True)
 
@@ -238,7 +242,8 @@ class _Run:
         assert self.last is not None
         tight, limits = tuple(self.tight.values()), self.limits.content()
         parts = (tuple(self.edits), limits, tuple(self.missed), tight, tuple(map(grip_content, self.grips)))
-        known = Checkpoint(tuple(self.done), self.last, *parts, edited=tuple(self.edited))
+        corrections = tuple(self.corrected), tuple(self.uncorrected)
+        known = Checkpoint(tuple(self.done), self.last, *parts, tuple(self.edited), *corrections)
         self.settled = self.model, known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
@@ -288,7 +293,8 @@ class _Run:
             tuple(self.missed),
             tuple(self.edits),
             tuple(self.grips),
-            tuple(self.corrections),
+            tuple(self.corrected),
+            tuple(self.uncorrected),
             tuple(self.limits.stops),
             tuple(self.tight.values()),
             self.equilibria,

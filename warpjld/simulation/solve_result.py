@@ -10,7 +10,7 @@ from warpjld.fem.contact import ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct_frames import CorrectedFrame
+from warpjld.simulation.grip.correct_frames import CorrectedDigit
 from warpjld.simulation.grip.find import FoundGrip
 from warpjld.simulation.solve.bone_clearance import TightBone
 from warpjld.simulation.solve.force_limit import Stop
@@ -48,7 +48,8 @@ class SolveResult:
         missed: Contacts between two frames that neither of the frames shows.
         edits: Joint flexions set by grip searches, corrections and force limits, in order.
         grips: Results of the grip searches.
-        corrections: Results of the corrections of frames.
+        corrected: Digits that corrections opened.
+        uncorrected: Digits that corrections could not help, in words.
         stops: Digits that stopped at their force limit.
         tight: Frame and smallest clearance between bone and object, by actor, digit and object.
         equilibria: Equilibrium of each frame that this run solved, by frame number, for differentiation.
@@ -64,7 +65,8 @@ class SolveResult:
     missed: tuple[MissedContact, ...] = ()
     edits: tuple[AngleEdit, ...] = ()
     grips: tuple[FoundGrip, ...] = ()
-    corrections: tuple[CorrectedFrame, ...] = ()
+    corrected: tuple[CorrectedDigit, ...] = ()
+    uncorrected: tuple[str, ...] = ()
     stops: tuple[Stop, ...] = ()
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)

@@ -17,6 +17,10 @@ def poses_between(poses: Poses, at: NDArray[np.float64]) -> Poses:
     before = np.floor(at).astype(int)
     after = np.minimum(before + 1, len(poses) - 1)
     part = (at - before)[:, None, None]
+    if not len(at):
+        return poses[:0]
+    start = int(before.min())
+    poses, before, after = poses[start : int(after.max()) + 1], before - start, after - start  # may be streamed
     if not part.any():
         return Poses(poses.positions[before], poses.rotations[before], poses.flexion[before])
     first, second = poses.rotations[before], poses.rotations[after]

@@ -1,19 +1,64 @@
-"""Poses of any number of frames that are computed when they are looked at, a block at a time."""
+"""Frames of any number that are computed when they are looked at, a block at a time: poses, and what they come of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cached_property
+from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.skeleton.kinematics import Poses
 
-__all__ = ["BLOCK", "StreamedPoses", "blocks_of", "streamed"]
+__all__ = ["BLOCK", "HeldBlock", "StreamedPoses", "blocks_of", "streamed", "streamed_rows"]
 
 BLOCK = 1024
 """Frames that are computed at once: some megabytes for a body, and enough to make little of what each call costs."""
+
+
+class _Frames(Protocol):
+    def __len__(self) -> int: ...
+    def __getitem__(self, frames: slice, /) -> Self: ...
+
+
+_SomeFrames = TypeVar("_SomeFrames", bound=_Frames)
+
+
+class HeldBlock(Generic[_SomeFrames]):
+    """F frames of any kind, of which the block looked at last is held.
+
+    Args:
+        count: F.
+        made: A range of the frames.
+    """
+
+    def __init__(self, count: int, made: Callable[[slice], _SomeFrames]) -> None:
+        self.made = made
+        self._count = count
+        self._held: tuple[int, _SomeFrames] | None = None
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, frames: slice) -> _SomeFrames:
+        """A block or less, counted from 0."""
+        start, stop, _ = frames.indices(self._count)
+        stop = max(start, stop)
+        if self._held is None or not self._held[0] <= start <= stop <= self._held[0] + len(self._held[1]):
+            start_of = min(start, max(self._count - 1, 0))
+            self._held = start_of, self.made(slice(start_of, min(start_of + BLOCK, self._count)))
+        first, held = self._held
+        return held[start - first : stop - first]
+
+    def part(self, start: int) -> Callable[[slice], _SomeFrames]:
+        """The same frames, counted from another one."""
+
+        def made(frames: slice) -> _SomeFrames:
+            span = slice(start + frames.start, start + frames.stop)
+            return self[span] if frames.stop - frames.start <= BLOCK else self.made(span)
+
+        return made
 
 
 class StreamedPoses(Poses):
@@ -73,6 +118,20 @@ class StreamedPoses(Poses):
 def streamed(frames: NDArray[np.float64], posed: Callable[[NDArray[np.float64]], Poses]) -> Poses:
     """Poses of F frames: computed at once where they are a block or less, streamed where they are more."""
     return posed(frames) if len(frames) <= BLOCK else StreamedPoses(frames, posed)
+
+
+def streamed_rows(count: int, made: Callable[[slice], Poses]) -> Poses:
+    """Poses of F frames of which any range can be made."""
+
+    def posed(frames: NDArray[np.float64]) -> Poses:
+        rows = frames.astype(np.int64)
+        first, last = (int(rows.min()), int(rows.max())) if len(rows) else (0, -1)
+        some = made(slice(first, last + 1))
+        if last - first + 1 == len(rows) and (np.diff(rows) == 1).all():
+            return some
+        return Poses(some.positions[rows - first], some.rotations[rows - first], some.flexion[rows - first])
+
+    return streamed(np.arange(count, dtype=np.float64), posed)
 
 
 def blocks_of(poses: Poses) -> Iterator[tuple[int, Poses]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
     from warpjld.grasp.distance import ObjectSet
     from warpjld.grasp.objects import GraspObject, Places
-    from warpjld.touch.limit import LimitedDigit
+    from warpjld.touch.limited_digits import LimitedDigits
     from warpjld.touch.touch import Touch, Touched
 
 __all__ = ["SkinContact"]
@@ -33,8 +34,8 @@ class SkinContact:
     def __init__(self, covering: Covering, *, limits: bool) -> None:
         self._covering = covering
         self._limits = limits
-        self._closed: dict[tuple[str, int], LimitedDigit] = {}
-        self._deep: set[tuple[str, int]] = set()
+        self._closed: LimitedDigits | None = None
+        self._deep: dict[str, array[int]] = {}  # frames by part; a frame may be computed twice
         self._deepest: dict[str, tuple[Touched, Poses]] = {}
         self._objects: dict[int, ObjectSet] = {}
         self._in_objects: dict[tuple[str, str], Touched] = {}
@@ -53,7 +54,10 @@ class SkinContact:
         from warpjld.touch.limit import close_until_touch
 
         limited, closed = close_until_touch(self._covering, poses, self.touch, first=first)
-        self._closed.update({(limit.digit, limit.frame): limit for limit in closed})
+        if self._closed is None:
+            self._closed = closed
+        else:
+            self._closed.add_all(closed)
         return limited
 
     def skin(self, points: NDArray[np.float32], poses: Poses, *, first: int = 0) -> NDArray[np.float32]:
@@ -61,7 +65,7 @@ class SkinContact:
         parted, deep = self.touch.apply(points, poses, first=first)
         for overlap in deep:
             worst = self._deepest.get(overlap.part)
-            self._deep.add((overlap.part, overlap.frame))  # a set, since a frame may be computed twice
+            self._deep.setdefault(overlap.part, array("q")).append(overlap.frame)
             if worst is None or overlap.depth > worst[0].depth:
                 k = overlap.frame - first
                 self._deepest[overlap.part] = overlap, poses[k : k + 1]
@@ -88,26 +92,33 @@ class SkinContact:
         """Messages for the user: a line for each digit that was closed less than posed, and one for each digit or part
         that lies too deep in another, with its worst frame."""
         lines = self._too_coarse()
-        for name in dict.fromkeys(digit for digit, _ in self._closed):
-            limits = [limit for (digit, _), limit in self._closed.items() if digit == name]
-            stuck = [limit.frame for limit in limits if limit.crosses]
-            if stuck:
-                lines.append(
-                    f"{name}: {_frames(len(stuck))} cross something however far it opens, as at frame {stuck[0]}"
-                )
-            closed = [limit for limit in limits if limit.share < 1.0]
-            if closed:
-                worst = max(closed, key=lambda limit: limit.depth)
-                inside = f"{1e3 * worst.depth:.1f} mm inside {worst.other} as posed" if worst.other else "folded"
-                lines.append(
-                    f"{name}: {_frames(len(closed))} closed only until it touches, deepest at frame {worst.frame}: "
-                    f"{inside}, touches at {worst.flexion:.0f}° of flexion in all"
-                )
+        lines += self._closed_less()
         lines += self._too_deep()
         lines += [
             f"{deep.part}: {1e3 * deep.depth:.1f} mm inside {deep.other} at frame {deep.frame}, more than skin can give"
             for deep in self._in_objects.values()
         ]
+        return lines
+
+    def _closed_less(self) -> list[str]:
+        """Messages about digits that were closed less than posed."""
+        found, lines = self._closed, []
+        for name, rows in ({} if found is None else found.by_digit()).items():
+            assert found is not None
+            stuck = rows[rows["crosses"]]
+            if len(stuck):
+                lines.append(
+                    f"{name}: {_frames(len(stuck))} cross something however far it opens, as at frame "
+                    f"{stuck['frame'][0]}"
+                )
+            closed = rows[rows["share"] < 1.0]
+            if len(closed):
+                worst = found.told(closed[closed["depth"].argmax()])
+                inside = f"{1e3 * worst.depth:.1f} mm inside {worst.other} as posed" if worst.other else "folded"
+                lines.append(
+                    f"{name}: {_frames(len(closed))} closed only until it touches, deepest at frame {worst.frame}: "
+                    f"{inside}, touches at {worst.flexion:.0f}° of flexion in all"
+                )
         return lines
 
     def _too_coarse(self) -> list[str]:
@@ -133,7 +144,7 @@ class SkinContact:
         lines = []
         for name, parts in by_name.items():
             worst, pose = max((self._deepest[part] for part in parts), key=lambda pair: pair[0].depth)
-            frames = len({frame for part, frame in self._deep if part in parts})
+            frames = len(np.unique(np.concatenate([self._deep[part] for part in parts])))
             touches = ""
             if name in digits:
                 limits = close_until_touch(self._covering, pose, self.touch)[1]

@@ -14,13 +14,15 @@ from warpjld.covering.intersections import crossing_faces
 from warpjld.geometry.rotations import conjugate, multiply, rotate
 from warpjld.skeleton.digits import digit_joints
 from warpjld.skeleton.kinematics import Poses, vertical_flexion
+from warpjld.skeleton.streamed_poses import blocks_of, streamed_rows
 from warpjld.touch.frame import Overlaps
+from warpjld.touch.limited_digits import LimitedDigits
 from warpjld.touch.touch import Touch
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
 
-__all__ = ["LimitedDigit", "close_until_touch"]
+__all__ = ["close_until_touch"]
 
 _ALLOWED = 0.5  # depth that a digit may overlap, relative to what skin can yield; its separation then bulges little
 _BESIDE = 0.4  # factor of overlaps between two digits: side by side they overlap regardless of their flexion
@@ -31,33 +33,8 @@ _BLOCK = 32  # frames searched at once
 _STILL = 1e-6  # rotation from rest [rad] below which a digit cannot be opened
 
 
-@dataclass(frozen=True)
-class LimitedDigit:
-    """A digit that was closed less than posed in one frame.
-
-    Attributes:
-        digit: Name, e.g. ``left.index``.
-        frame: Frame number.
-        depth: Penetration depth in the original pose [m].
-        share: Share of its joints' rotation from rest that is kept, 0…1.
-        flexion: Sum of its joints' flexion at which it touches [degrees].
-        other: Part it penetrates in the original pose; empty where its faces only crossed.
-        crosses: Whether it still crosses another part, however far it opens.
-    """
-
-    digit: str
-    frame: int
-    depth: float
-    share: float
-    flexion: float
-    other: str
-    crosses: bool
-
-
-def close_until_touch(
-    covering: Covering, poses: Poses, touch: Touch, *, first: int = 0
-) -> tuple[Poses, list[LimitedDigit]]:
-    """Poses whose digits are bent only until they touch, and the digits that this changed.
+def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: int = 0) -> tuple[Poses, LimitedDigits]:
+    """Poses whose digits are bent only until they touch, and the digits that this changed, by digit and frame.
 
     The joints of a digit turn back together, by a common share of their rotation from rest: the least for which its
     deepest overlap is half of what skin can yield, and no face of it crosses another after separation. Digits are
@@ -72,23 +49,34 @@ def close_until_touch(
         first: Number of the first frame, for reports.
     """
     digits = _digits(covering)
-    reported: list[LimitedDigit] = []
+    reported = LimitedDigits([digit.name for digit in digits], [fan.name for fan in covering.fans])
     if not digits:
         return poses, reported
-    searched = [_block(covering, poses[k : k + _BLOCK], touch, digits) for k in range(0, len(poses), _BLOCK)]
+    spans = [slice(k, min(k + _BLOCK, len(poses))) for k in range(0, len(poses), _BLOCK)]
+    searched = [_block(covering, poses[span], touch, digits) for span in spans]
     moved = _motion(covering, poses, digits)
-    limited = poses
+    shares = []
     for n, digit in enumerate(digits):
-        share, stuck, _, depth, other = (np.concatenate([block[n][k] for block in searched]) for k in range(5))
-        share = _steady(share, moved / np.maximum(_bend(covering, poses, digit.joints), _STILL))
-        limited = _bent(covering, limited, digit.joints, share)
-        for f in np.flatnonzero((share < 1.0) | stuck).tolist():
-            flexion = float(np.degrees(limited.flexion[f, digit.joints].sum()))
-            name = covering.fans[int(other[f])].name if other[f] >= 0 else ""
-            reported.append(
-                LimitedDigit(digit.name, first + f, float(depth[f]), float(share[f]), flexion, name, bool(stuck[f]))
-            )
-    return limited, reported
+        bend = np.concatenate([_bend(covering, some, digit.joints) for _, some in blocks_of(poses)])
+        share = np.concatenate([block[n][0] for block in searched])
+        shares.append(_steady(share, moved / np.maximum(bend, _STILL)))
+
+    def limited(frames: slice) -> Poses:
+        some = poses[frames]
+        for digit, share in zip(digits, shares, strict=True):
+            some = _bent(covering, some, digit.joints, share[frames])
+        return some
+
+    for span, block in zip(spans, searched, strict=True):
+        some = poses[span]
+        for n, (digit, (_, stuck, _, depth, other)) in enumerate(zip(digits, block, strict=True)):
+            share = shares[n][span]
+            some = _bent(covering, some, digit.joints, share)
+            f = np.flatnonzero((share < 1.0) | stuck)
+            flexion = np.degrees(some.flexion[f][:, digit.joints].sum(axis=1))
+            frames, found = first + span.start + f, {"depth": depth[f], "other": other[f], "crosses": stuck[f]}
+            reported.add(n, frames, share=share[f], flexion=flexion, **found)
+    return streamed_rows(len(poses), limited), reported
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,10 +155,14 @@ def _motion(covering: Covering, poses: Poses, digits: list[_Digit]) -> NDArray[n
     """Largest rotation of any digit's joint from the frame before [rad], shape (F,)."""
     joints = [j for digit in digits for j in digit.joints]
     parents = [max(int(covering.skeleton.parents[j]), 0) for j in joints]
-    local = multiply(conjugate(poses.rotations[:, parents]), poses.rotations[:, joints])
-    step = multiply(conjugate(local[:-1]), local[1:])
-    turned = Rotation.from_quat(step.reshape(-1, 4)).magnitude().reshape(step.shape[:2]) if len(step) else step[..., 0]
-    return np.concatenate([np.zeros(min(len(poses), 1)), turned.max(axis=1)])
+    out, last = [np.zeros(min(len(poses), 1))], np.zeros((0, len(joints), 4))
+    for _, some in blocks_of(poses):
+        local = np.concatenate([last, multiply(conjugate(some.rotations[:, parents]), some.rotations[:, joints])])
+        step, last = multiply(conjugate(local[:-1]), local[1:]), local[-1:]
+        if len(step):
+            turned = Rotation.from_quat(step.reshape(-1, 4)).magnitude().reshape(step.shape[:2])
+            out.append(turned.max(axis=1))
+    return np.concatenate(out)
 
 
 def _steady(share: NDArray[np.float64], moved: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -187,18 +187,19 @@ def varies(curve: Any) -> bool:
     return len({keys[i].value for i in range(len(keys))}) > 1
 
 
-def sample(scene: Any, stack: int, times: Array) -> Array:
-    """Node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4)."""
+def sample(scene: Any, stack: int, times: Array, out: str) -> None:
+    """Write node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4), as they lie in memory."""
     anim = taken(taken(scene.anim_stacks[stack]).anim)
-    worlds = np.tile(np.eye(4), (len(times), len(scene.nodes), 1, 1))
-    for world, time in zip(worlds, times, strict=True):
-        shown = scene.evaluate(anim, float(time))
-        KEPT.append(shown)
-        nodes = shown.nodes
-        for n in range(len(nodes)):
-            world[n, :3] = np.array(taken(nodes[n]).node_to_world).T
-        shown.free()  # frees its memory; the Python objects of its nodes remain
-    return worlds
+    world = np.tile(np.eye(4), (len(scene.nodes), 1, 1))
+    with open(out, "wb") as file:
+        for time in times:
+            shown = scene.evaluate(anim, float(time))
+            KEPT.append(shown)
+            nodes = shown.nodes
+            for n in range(len(nodes)):
+                world[n, :3] = np.array(taken(nodes[n]).node_to_world).T
+            shown.free()  # frees its memory; the Python objects of its nodes remain
+            file.write(world.tobytes())
 
 
 def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
@@ -246,7 +247,7 @@ def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
         # as warpjld.motion.frame_times: rounding (23.976, float32) must not lose the last frame
         slack = min(0.01 + 2e-5 * count, 0.4)
         times = np.minimum(stack["begin"] + np.arange(int(np.floor(count + slack)) + 1) / rate_, stack["end"])
-        arrays["worlds"] = sample(scene, chosen, times)
+        sample(scene, chosen, times, f"{out}.worlds")
         told |= {"chosen": stack["name"], "rate": rate_}
     np.savez(out, told=np.array(json.dumps(told)), **arrays)  # type: ignore[arg-type]
 

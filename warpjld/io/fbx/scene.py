@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError
+from warpjld.files.spilled_rows import SpilledRows
 
 __all__ = ["FbxMesh", "FbxScene", "FbxSkin", "FbxStack", "read_scene"]
 
@@ -94,7 +95,8 @@ class FbxScene:
         pose: Node-to-world transforms of the file's bind pose, NaN for nodes that are not in it.
         meshes: Meshes in the order of their nodes.
         stacks: Animations.
-        worlds: Node-to-world transforms of the requested animation, shape (F, N, 4, 4); None without.
+        worlds: Node-to-world transforms of the requested animation, N × 16 numbers a frame, row after row; None
+            without.
         rate: Frames a second.
         title: Name of that animation.
         notes: What was left out.
@@ -108,7 +110,7 @@ class FbxScene:
     pose: NDArray[np.float64]
     meshes: tuple[FbxMesh, ...]
     stacks: tuple[FbxStack, ...]
-    worlds: NDArray[np.float64] | None
+    worlds: SpilledRows | None
     rate: float
     title: str
     notes: tuple[str, ...]
@@ -136,13 +138,13 @@ def read_scene(path: str | Path, *, animated: bool = False, name: str | None = N
         raise InputError(f"cannot be read: {error.strerror}", path=path) from None
     if empty:
         raise InputError("is empty: an FBX file was expected", path=path)
-    told, arrays = _extract(path, animated, name or "", rate)
+    told, arrays, worlds = _extract(path, animated, name or "", rate)
     axes = _world_axes(told["axes"], told["unit"])
     meshes = tuple(_mesh(arrays, i, mesh, axes, path) for i, mesh in enumerate(told["meshes"]))
     names = tuple(name or f"node {n}" for n, name in enumerate(told["names"]))
-    worlds = arrays.get("worlds")
-    for transforms in (arrays["shown"], np.nan_to_num(arrays["pose"]), *(() if worlds is None else (worlds,))):
+    for transforms in (arrays["shown"], np.nan_to_num(arrays["pose"])):
         _check(transforms, names, path)
+    worlds = None if worlds is None else _placed(worlds, axes, names, path)
     return FbxScene(
         path=path,
         names=names,
@@ -152,15 +154,28 @@ def read_scene(path: str | Path, *, animated: bool = False, name: str | None = N
         pose=axes @ arrays["pose"],
         meshes=meshes,
         stacks=tuple(FbxStack(s["name"], s["end"] - s["begin"], len(s["curved"]), s["shapes"]) for s in told["stacks"]),
-        worlds=None if worlds is None else axes @ worlds,
+        worlds=worlds,
         rate=told["rate"],
         title=told.get("chosen", ""),
         notes=tuple(told["notes"]),
     )
 
 
-def _extract(path: Path, animated: bool, name: str, rate: float) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Output of :mod:`extract`, run as a program, since it may crash on a broken file."""
+def _placed(worlds: SpilledRows, axes: NDArray[np.float64], names: tuple[str, ...], path: Path) -> SpilledRows:
+    """Transforms of all frames in metres, right-handed, Y up."""
+    out = SpilledRows(16 * len(names))
+    for block in worlds.blocks():
+        transforms = block.reshape(-1, len(names), 4, 4)
+        _check(transforms, names, path)
+        out.extend((axes @ transforms).reshape(len(block), -1))
+    return out
+
+
+def _extract(
+    path: Path, animated: bool, name: str, rate: float
+) -> tuple[dict[str, Any], dict[str, NDArray[Any]], SpilledRows | None]:
+    """Output of :mod:`extract`, run as a program, since it may crash on a broken file; the transforms of an
+    animation's frames as rows."""
     program = Path(__file__).with_name("extract.py")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
@@ -184,8 +199,12 @@ def _extract(path: Path, animated: bool, name: str, rate: float) -> tuple[dict[s
             raise InputError(f"cannot be read as FBX: {why}", path=path)
         with np.load(out) as content:
             arrays = {key: content[key] for key in content.files}
+        worlds = None
+        if (frames := out.with_name(f"{out.name}.worlds")).exists():
+            worlds = SpilledRows(16 * len(arrays["shown"]))
+            worlds.extend_from(frames)
     told: dict[str, Any] = json.loads(str(arrays.pop("told")))
-    return told, arrays
+    return told, arrays, worlds
 
 
 def _world_axes(axes: list[int], unit: float) -> NDArray[np.float64]:

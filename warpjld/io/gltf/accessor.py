@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 }
 
 
-def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
+def read_accessor(gltf: Any, buffers: Sequence[bytes | memoryview], index: int) -> NDArray[Any]:
     """Elements of accessor ``index`` as a new array; matrices as rows and columns.
 
     Raises:
@@ -69,7 +70,7 @@ def read_accessor(gltf: Any, buffers: list[bytes], index: int) -> NDArray[Any]:
 
 def _strided(
     gltf: Any,
-    buffers: list[bytes],
+    buffers: Sequence[bytes | memoryview],
     what: str,
     view_index: int,
     offset: int,

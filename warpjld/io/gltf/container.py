@@ -16,8 +16,8 @@ _BOM = b"\xef\xbb\xbf"
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942  # chunk types of GLB: "JSON", "BIN\0"
 
 
-def read_container(path: Path) -> tuple[str, dict[str, Any], bytes | None]:
-    """The JSON of a glTF 2.0 file, as text and parsed, and its binary chunk or None.
+def read_container(path: Path) -> tuple[str, dict[str, Any], memoryview | None]:
+    """The JSON of a glTF 2.0 file, as text and parsed, and its binary chunk, which is not copied, or None.
 
     Raises:
         InputError: It cannot be read, is truncated, is glTF 1.0, or not glTF.
@@ -46,7 +46,7 @@ def read_container(path: Path) -> tuple[str, dict[str, Any], bytes | None]:
     return text, content, blob
 
 
-def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
+def _chunks(path: Path, data: bytes) -> tuple[bytes, memoryview | None]:
     if len(data) < 20:
         raise InputError(f"is truncated: a GLB starts with a 20 byte header, got {len(data)} bytes", path=path)
     version, length = struct.unpack_from("<II", data, 4)
@@ -56,14 +56,14 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
         raise InputError(f"is GLB version {version}: version 2 is read", path=path)
     if len(data) < length:
         raise InputError(f"is truncated: its header says {length} bytes, got {len(data)}", path=path)
-    found: dict[int, bytes] = {}
+    found: dict[int, memoryview] = {}
     at = 12
     while at + 8 <= length:
         size, kind = struct.unpack_from("<II", data, at)
         if at + 8 + size > len(data):
             raise InputError(f"is truncated: a chunk of {size} bytes is not there whole", path=path)
-        found.setdefault(kind, data[at + 8 : at + 8 + size])
+        found.setdefault(kind, memoryview(data)[at + 8 : at + 8 + size])
         at += 8 + size + (-size % 4)
     if _JSON not in found:
         raise InputError("is not a glTF 2.0 file: no JSON chunk", path=path)
-    return found[_JSON], found.get(_BINARY)
+    return bytes(found[_JSON]), found.get(_BINARY)

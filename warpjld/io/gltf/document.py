@@ -51,7 +51,7 @@ class Document:
         self.content = content
 
     @cached_property
-    def buffers(self) -> list[bytes]:
+    def buffers(self) -> list[bytes | memoryview]:
         """Raw bytes of every buffer: the GLB's own chunk, data URIs, or files beside the document."""
         return [self._buffer(i, buffer) for i, buffer in enumerate(self.gltf.buffers)]
 
@@ -205,10 +205,10 @@ class Document:
         local[:3, :3] = matrices(rotation) * scale
         return local
 
-    def _buffer(self, index: int, buffer: Any) -> bytes:
+    def _buffer(self, index: int, buffer: Any) -> bytes | memoryview:
         uri = buffer.uri
         if uri is None:
-            data: bytes = self.gltf.binary_blob() or b""
+            data: bytes | memoryview = self.gltf.binary_blob() or b""
         elif uri.startswith("data:"):
             data = _data_uri(uri, f"buffer {index}", self.path)
         else:

@@ -56,19 +56,27 @@ def animate(
     count, frames = len(nodes.joints), len(motion)
     at = nodes.joints
     given = np.isin(np.arange(len(nodes.parents)), at)
-    rotations = np.empty((frames, count, 4), np.float32)
-    translations = np.empty((frames, count, 3), np.float32)
+    moved = np.flatnonzero(nodes.under(motion.owner >= 0)).tolist()
+    # a joint's keys lie together in the file, and nothing else holds them: rotations are most of a long clip
+    rotations = np.empty((len(moved), frames, 4), np.float32)
+    translations: dict[int, NDArray[np.float32]] = {}
     strays, sheared = np.zeros(count), np.zeros(count)
+    last = np.zeros((len(moved), 1, 4), np.float32)
     for block in motion.blocks():
         worlds = np.zeros((block.stop - block.start, len(given), 4, 4))
         worlds[:, at] = nodes.worlds(block)
         local = local_motion(worlds, nodes.parents, nodes.rest, nodes.scales, given)
-        rotations[block], translations[block] = local.rotations[:, at], local.translations[:, at]
+        turns = local.rotations[:, at[moved]].swapaxes(0, 1).astype(np.float32)
+        rotations[:, block] = _continuous(np.concatenate([last, turns], axis=1))[:, 1:]
+        last = rotations[:, block.stop - 1 : block.stop]
         away = np.linalg.norm(local.translations[:, at] - nodes.rest[at, :3, 3], axis=-1).max(axis=0)
         strays = np.maximum(strays, away * nodes.reach)
         sheared = np.maximum(sheared, local.sheared[at])
-    _continuous(rotations)
-    moved = np.flatnonzero(nodes.under(motion.owner >= 0)).tolist()
+        for joint in (j for j in moved if strays[j] > _CONSTANT * nodes.size):
+            if joint not in translations:
+                translations[joint] = np.empty((frames, 3), np.float32)
+                translations[joint][: block.start] = nodes.rest[at[joint], :3, 3]
+            translations[joint][block] = local.translations[:, at[joint]]
     times = file.add((np.arange(frames) / timing.rate).astype("<f4"), "SCALAR", bounds=True)
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
@@ -78,11 +86,11 @@ def animate(
         target = {"node": int(nodes.numbers[at[joint]]), "path": path}
         channels.append({"sampler": len(samplers) - 1, "target": target})
 
-    for joint in moved:
+    for turns, joint in zip(rotations, moved, strict=True):
         nodes.make_animatable(joint)
-        channel(joint, "rotation", rotations[:, joint], "VEC4")
-        if strays[joint] > _CONSTANT * nodes.size:
-            channel(joint, "translation", translations[:, joint], "VEC3")
+        channel(joint, "rotation", turns, "VEC4")
+        if joint in translations:
+            channel(joint, "translation", translations[joint], "VEC3")
     if baked is not None and baked.names:
         shown = file.add(baked.over_time.astype("<f4").reshape(-1), "SCALAR")
         samplers.append({"input": times, "interpolation": "LINEAR", "output": shown})
@@ -99,8 +107,9 @@ def animate(
         )
 
 
-def _continuous(rotations: NDArray[np.float32]) -> None:
-    """Flip quaternion signs such that consecutive frames interpolate the short way, in place, shape (F, N, 4)."""
-    for frame in range(1, len(rotations)):
-        far = (rotations[frame] * rotations[frame - 1]).sum(-1) < 0.0
-        rotations[frame][far] *= -1.0
+def _continuous(rotations: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Quaternions (N, F, 4) with such signs that consecutive frames interpolate the short way."""
+    far = (rotations[:, 1:] * rotations[:, :-1]).sum(-1) < 0.0
+    sign = np.where(np.logical_xor.accumulate(far, axis=1), np.float32(-1.0), np.float32(1.0))
+    rotations[:, 1:] *= sign[..., None]
+    return rotations

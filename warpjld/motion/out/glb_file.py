@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,24 +36,25 @@ def read_gltf_json(data: bytes) -> dict[str, Any]:
 class GlbFile:
     """JSON and binary content of a GLB file; ``add`` appends an array to both."""
 
-    def __init__(self, content: dict[str, Any], chunks: list[bytes]) -> None:
+    def __init__(self, content: dict[str, Any], chunks: Sequence[bytes | memoryview]) -> None:
         """Take ownership of ``content``, whose buffers are ``chunks``; these are merged into one buffer."""
         self.content = content
-        self._chunks: list[bytes] = []
+        self._chunks: list[bytes | memoryview] = []
         self._length = 0
         starts = [self.append(chunk) for chunk in chunks]
         for view in content.get("bufferViews", ()):
             view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
             view["buffer"] = 0
 
-    def append(self, data: bytes) -> int:
-        """Append bytes at a multiple of four; returns their offset."""
+    def append(self, data: bytes | memoryview) -> int:
+        """Append bytes, which are not copied, at a multiple of four; returns their offset."""
         start = self._length
-        self._chunks.append(data + b"\0" * (-len(data) % 4))
-        self._length += len(self._chunks[-1])
+        for chunk in (data, b"\0" * (-len(data) % 4)):
+            self._chunks.append(chunk)
+            self._length += len(chunk)
         return start
 
-    def add_view(self, data: bytes, target: int | None = None) -> int:
+    def add_view(self, data: bytes | memoryview, target: int | None = None) -> int:
         """Add a buffer view of new bytes; returns its index."""
         view = {"buffer": 0, "byteOffset": self.append(data), "byteLength": len(data)}
         if target is not None:
@@ -60,7 +62,7 @@ class GlbFile:
         return self._add("bufferViews", view)
 
     def add(self, array: NDArray[Any], kind: str, *, target: int | None = None, bounds: bool = False) -> int:
-        """Add an accessor of a new float32, uint32 or uint16 array; returns its index.
+        """Add an accessor of a new float32, uint32 or uint16 array, which is not copied; returns its index.
 
         Args:
             array: The array, one element per row.
@@ -69,7 +71,7 @@ class GlbFile:
             bounds: Whether minimum and maximum are stored, as for positions and times.
         """
         accessor: dict[str, Any] = {
-            "bufferView": self.add_view(np.ascontiguousarray(array).tobytes(), target),
+            "bufferView": self.add_view(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data, target),
             "componentType": _COMPONENTS[array.dtype.str.lstrip("<=")],
             "count": len(array),
             "type": kind,

@@ -16,6 +16,7 @@ from warpjld.motion.mano_rest import MANO_DIGITS, MANO_JOINTS, mano_rest
 from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, Skeleton
+from warpjld.skeleton.streamed_poses import blocks_of
 
 __all__ = ["hand_parameters", "write_mano"]
 
@@ -45,7 +46,8 @@ def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMot
         fields["side"] = np.array(sides[0])
     for side in sides:
         prefix = f"{side}_" if len(sides) > 1 else ""
-        fields |= {prefix + name: value for name, value in hand_parameters(rig.skeleton, poses, side).items()}
+        blocks = [hand_parameters(rig.skeleton, some, side) for _, some in blocks_of(poses)]
+        fields |= {prefix + name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     with path.open("wb") as file:
         np.savez(file, allow_pickle=False, **fields)
     return WrittenMotion(("MANO's axis-angles from the flat hand; metacarpals, which MANO has not, in the fingers'",))

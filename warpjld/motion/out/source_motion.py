@@ -27,6 +27,7 @@ from warpjld.rig import Rig
 from warpjld.runtime.lazily import lazy_module
 from warpjld.skeleton import Poses
 from warpjld.skeleton.recognise.tree import SourceTree
+from warpjld.skeleton.streamed_poses import blocks_of
 
 if TYPE_CHECKING:
     import scipy.spatial.transform as transform
@@ -71,7 +72,7 @@ class SourceMotion:
 
         Signs are those of ``poses``: aligned along the tree, not over time.
         """
-        out = self.poses.rotations[frames][:, np.maximum(self.owner, 0)]
+        out = self.poses[frames].rotations[:, np.maximum(self.owner, 0)]
         out[:, self.owner < 0] = (0.0, 0.0, 0.0, 1.0)
         return out
 
@@ -79,7 +80,7 @@ class SourceMotion:
         """Positions of every joint in the rig's frame [m, Y up], shape (f, N, 3)."""
         own = np.maximum(self.owner, 0)
         at = self.rest_frames[:, :3, 3]
-        out = self.poses.positions[frames][:, own] + rotate(self.rotations(frames), at - self.rest[own])
+        out = self.poses[frames].positions[:, own] + rotate(self.rotations(frames), at - self.rest[own])
         out[:, self.owner < 0] = at[self.owner < 0]
         return out
 
@@ -114,12 +115,15 @@ def source_motion(rig: Rig, poses: Poses) -> SourceMotion:
     count = len(rig.skeleton)
     if len(poses) < 1:
         raise InputError("poses: want at least one frame")
-    if poses.positions.shape[1:] != (count, 3) or poses.rotations.shape[1:] != (count, 4):
-        raise InputError(f"poses: want {count} joints, as the rig has, got {poses.positions.shape[1]}")
-    for name, array in (("positions", poses.positions), ("rotations", poses.rotations)):
-        if not np.isfinite(array).all():
-            frame, joint = np.argwhere(~np.isfinite(array))[0][:2]
-            raise InputError(f"poses: {name} of {rig.skeleton.names[joint]} are not finite at frame {frame}")
+    one = poses[:1]
+    if one.positions.shape[1:] != (count, 3) or one.rotations.shape[1:] != (count, 4):
+        raise InputError(f"poses: want {count} joints, as the rig has, got {one.positions.shape[1]}")
+    for first, some in blocks_of(poses):
+        for name, array in (("positions", some.positions), ("rotations", some.rotations)):
+            if not np.isfinite(array).all():
+                frame, joint = np.argwhere(~np.isfinite(array))[0][:2]
+                where = f"{rig.skeleton.names[joint]} are not finite at frame {first + frame}"
+                raise InputError(f"poses: {name} of {where}")
     if rig.source is None:
         frames = np.tile(np.eye(4), (count, 1, 1))
         frames[:, :3, 3] = rig.skeleton.rest

@@ -108,10 +108,10 @@ def correct_frame(
     return out
 
 
-def worst_digits(frames: Sequence[CorrectedFrame]) -> list[CorrectedDigit]:
+def worst_digits(digits: Sequence[CorrectedDigit]) -> list[CorrectedDigit]:
     """For every corrected digit, the frame at which its force before correction was largest."""
     out: dict[tuple[str, str], CorrectedDigit] = {}
-    for one in (digit for frame in frames for digit in frame.digits):
+    for one in digits:
         place = (one.actor, one.digit)
         if place not in out or one.before > out[place].before:
             out[place] = one

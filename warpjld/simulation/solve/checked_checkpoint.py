@@ -25,6 +25,7 @@ _TYPES: dict[str, Any] = {
     "float | None": (int, float, type(None)),
 }
 """Python types that JSON yields, by annotation of a record's field."""
+_TRIPLE = "tuple[float, float, float]"
 _UNKNOWN = ("bond_gap",)
 """Fields of a contact state that may be NaN (unknown)."""
 
@@ -74,11 +75,18 @@ def plain_record(kind: type[_T], content: Mapping[str, Any]) -> _T:
         InputError: A field has another type, or is not finite.
     """
     for one in fields(kind):  # type: ignore[arg-type]
-        value, want = content[one.name], _TYPES[str(one.type)]
-        finite = not isinstance(value, float) or np.isfinite(value)
-        if not isinstance(value, want) or isinstance(value, bool) or not finite:
+        value = content[one.name]
+        triple = one.type == _TRIPLE
+        parts = (value if isinstance(value, list) and len(value) == 3 else [None]) if triple else [value]
+        want = _TYPES["float" if triple else str(one.type)]
+        if not all(_is_plain(part, want) for part in parts):
             raise InputError(f"{one.name} of {kind.__name__}: want {one.type}, got {str(value)[:40]!r}")
-    return kind(**content)
+    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in content.items()})
+
+
+def _is_plain(value: Any, want: Any) -> bool:
+    finite = not isinstance(value, float) or bool(np.isfinite(value))
+    return isinstance(value, want) and not isinstance(value, bool) and finite
 
 
 def _check_state(state: ContactState, model: ContactModel, number: int) -> None:

@@ -22,6 +22,7 @@ from warpjld.files.reading import reading
 from warpjld.files.whole_file import whole_file
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.correct_frames import CorrectedDigit
 from warpjld.simulation.solve.bone_clearance import TightBone
 from warpjld.simulation.solve.checked_checkpoint import check_checkpoint, plain_record
 from warpjld.simulation.solve.identity import differences
@@ -49,6 +50,8 @@ class Checkpoint:
         tight: Frame and smallest clearance between bone and object, by actor, digit and object.
         grips: Grips found so far, as plain values (``grip_content``).
         edited: Number of edits at the time each frame was solved.
+        corrected: Digits that corrections opened.
+        uncorrected: Digits that corrections could not help, in words.
         identity: Hashes of the simulation it belongs to, by name of the part (see ``identity_of``).
     """
 
@@ -60,6 +63,8 @@ class Checkpoint:
     tight: tuple[tuple[float, TightBone], ...] = ()
     grips: tuple[dict[str, Any], ...] = ()
     edited: tuple[int, ...] = ()
+    corrected: tuple[CorrectedDigit, ...] = ()
+    uncorrected: tuple[str, ...] = ()
     identity: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -123,6 +128,8 @@ def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) 
         "tight": json.dumps([[frame, asdict(bone)] for frame, bone in state.tight]),
         "grips": json.dumps(state.grips, default=lambda number: number.item()),
         "edited": np.array(state.edited, np.int64),
+        "corrected": json.dumps([asdict(one) for one in state.corrected]),
+        "uncorrected": json.dumps(state.uncorrected),
         "memories": len(solution.states),
     }
     # one array per field, stacked over frames, so that the number of members does not grow with the run
@@ -191,6 +198,8 @@ def _read(file: Any) -> Checkpoint:
         tuple((float(frame), plain_record(TightBone, bone)) for frame, bone in _json(file, "tight")),
         tuple(dict(one) for one in _json(file, "grips")),
         tuple(int(count) for count in file["edited"]),
+        tuple(plain_record(CorrectedDigit, one) for one in _json(file, "corrected")),
+        tuple(str(one) for one in _json(file, "uncorrected")),
         {str(name): str(value) for name, value in dict(_json(file, "identity")).items()},
     )
 

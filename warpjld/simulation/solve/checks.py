@@ -52,8 +52,6 @@ def check_specification(animation: Animation, contact: ContactSpecification, req
         except InputError as error:
             raise located(error, grip.where) from None
         begun.add(grip.first)
-    if request.state is not None and request.correct:
-        raise InputError("STATE keeps no corrections: leave it out, or CORRECT")
     if request.correct and request.method == "paper":
         raise InputError("CORRECT goes on from the frame before: the paper's method cannot")
     recorded = [name for name in contact.flesh if not animation.actors[name].bendable]

@@ -59,9 +59,9 @@ def mano_grasps(content: Mapping[str, Any], name: str, how: GraspReading) -> lis
     fields = {"pose": hand.get("pose"), "global_orient": turn, "transl": trans, "side": side, "frame": "rig"}
     fields |= {key: hand[key] for key in ("flat_hand_mean", "hands_mean", "joint_order") if key in hand}
     (track,) = mano_hands(fields, _RATE, how.flat_hand_mean, where="the recording").hands
-    turns = track.turns(rig.skeleton)
-    if len(turns.local) != count:
-        raise InputError(f"pose: want {count} frames, got {len(turns.local)}")
+    if len(track.times) != count:
+        raise InputError(f"pose: want {count} frames, got {len(track.times)}")
+    turns = track.turns(rig.skeleton).part(slice(0, count))
     quaternions = Rotation.from_rotvec(facing).as_quat()
     wanted = range(count) if how.frames == "all" else [count - 1]
     remark = f"frame {count - 1} of {count}, the last" if count > 1 and how.frames != "all" else ""
