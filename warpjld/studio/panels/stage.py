@@ -73,8 +73,9 @@ class StagePanel:
         mesh = self._meshes[name]
         if not np.array_equal(one.vertices, self._drawn[name].vertices):
             mesh.vertices = one.vertices
-        mesh.wireframe = style == "wire-frame"
-        mesh.opacity = opacity
+        if (mesh.wireframe, mesh.opacity) != (style == "wire-frame", opacity):
+            self._remove(name)
+            self._draw(name, one)
 
     def _draw_colored(self, name: str, one: Shown) -> None:
         old = self._drawn.get(name)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
 from warpjld.files.names import check_name
-from warpjld.studio.background import Background, JobProgress
+from warpjld.studio.background import JobProgress
 from warpjld.studio.document import ScriptDocument
 from warpjld.studio.making import made, pressed
 
@@ -19,38 +19,28 @@ __all__ = ["WorkPanel"]
 
 
 class WorkPanel:
-    """Opening and saving inside the script's folder, ``RUN``, ``PRESS``, progress, verdict and table."""
+    """Opening and saving inside the script's folder, ``RUN``, ``PRESS``, verdict and table."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
-        self.work = Background(lambda: room.post(lambda: None, key="progress"))
         gui = room.server.gui
         self.name = gui.add_text("Script", room.state.document.path.name)
         self.files = gui.add_button_group("File", ("save", "open", "new"))
         self.scripts = gui.add_dropdown("In this folder", ("—",), initial_value="—")
         self.run = gui.add_button("RUN: make the files", hint="what warpjld run does with this script")
         self.press = gui.add_button("PRESS: solve contact", hint="and see the pressure on the skin")
-        self.cancel = gui.add_button("Cancel", disabled=True)
-        self.bar = gui.add_progress_bar(0.0, visible=False)
-        self.step = gui.add_markdown("", visible=False)
         self.result = gui.add_html("")
         self.files.on_click(lambda event: self._file(event.target.value))
         self.scripts.on_update(lambda event: room.by_hand(event, self._choose))
         self.run.on_click(lambda _: room.post(self._run))
         self.press.on_click(lambda _: room.post(self._press))
-        self.cancel.on_click(lambda _: self.work.cancel())
 
     def refresh(self) -> None:
         """Show what is being done, and what came of contact."""
-        running = self.work.running is not None
-        for control, disabled in ((self.run, running), (self.press, running), (self.cancel, not running)):
-            if control.disabled != disabled:
-                control.disabled = disabled
-        if self.bar.visible != running:
-            self.bar.visible = self.step.visible = running
-        if running:
-            self.bar.value = 100.0 * self.work.done
-            self.step.content = self.work.step
+        running = self._room.progress.work.running is not None
+        for control in (self.run, self.press):
+            if control.disabled != running:
+                control.disabled = running
         scripts = ("—", *sorted(path.name for path in self._folder.glob("*.jld")))
         if tuple(self.scripts.options) != scripts:
             self.scripts.options = scripts
@@ -117,7 +107,7 @@ class WorkPanel:
             names = ", ".join(str(one["name"]) for one in result["files"])
             state.messages.append(f"made in {scene.folder}: {names}")
 
-        self._start("RUN", work, told)
+        self._room.progress.start("RUN", work, told)
 
     def _press(self) -> None:
         state = self._room.state
@@ -127,18 +117,4 @@ class WorkPanel:
             state.solved, state.coloring = result, "pressure"
             state.messages.append(result.simulation.verdict.text)
 
-        self._start("PRESS", lambda progress: pressed(text, scene, progress), told)
-
-    def _start(self, what: str, work: Any, told: Any) -> None:
-        def ended(result: object, error: BaseException | None) -> None:
-            def show() -> None:
-                if error is not None:
-                    raise error
-                if result is None:
-                    self._room.state.messages.append(f"{what} was cancelled")
-                else:
-                    told(result)
-
-            self._room.post(show)
-
-        self.work.start(what, work, ended)
+        self._room.progress.start("PRESS", lambda progress: pressed(text, scene, progress), told)
