@@ -86,7 +86,8 @@ _DRAG = """async ([id, seconds, alone]) => {
   document.dispatchEvent(new MouseEvent('mouseup', at(0.5)));
   const spent = (performance.now() - first.time) / 1000;
   delays.sort((a, b) => a - b);
-  return {shown: shown.drawn - first.drawn, rate: (shown.drawn - first.drawn) / spent, fps: (shown.frames - first.frames) / spent,
+  const drawn = shown.drawn - first.drawn;
+  return {shown: drawn, rate: drawn / spent, fps: (shown.frames - first.frames) / spent,
           delay: delays.length ? delays[delays.length >> 1] : NaN, moves: k};
 }"""
 

@@ -206,6 +206,7 @@ def simulate(
     *,
     folder: Path = Path(),
     keeping: Callable[[Keep], None] = lambda keep: None,
+    showing: Callable[[DeformedSurfaces], None] = lambda surfaces: None,
     progress: Progress = lambda what, done, total: None,
 ) -> Simulation:
     """Solve contact over the frames of an animation, and report.
@@ -218,6 +219,7 @@ def simulate(
         keeping: Told, before the first frame, what keeps the frames that are solved by then, at any time: a function
             that writes them into the state file, or ``KEPT`` where none is asked for, and returns it; None where there
             is nothing that a run could go on from.
+        showing: Told after each frame what the surfaces are at those that are solved by then.
         progress: Told about the work.
 
     Returns:
@@ -249,9 +251,12 @@ def simulate(
     progress("meshing", 0, 1)
     model, notes = _model(specification, animation, before)
     table = ContactTable(specification.strength, animation)
+    done: list[SolvedFrame] = []
 
     def watch(driven: ContactModel, frame: SolvedFrame) -> str | None:
         reason = table.add(driven, frame)
+        done.append(frame)
+        showing(_surfaces(driven, done.copy(), before))
         return reason if request.stop else None
 
     frames = _frames(specification, request, model.start)
@@ -308,19 +313,25 @@ def _frames(specification: ContactSpecification, request: SolveSpecification, st
     return sorted(f for f in frames if f > start)
 
 
+def _surfaces(model: ContactModel, frames: Sequence[SolvedFrame], before: StartFrame) -> DeformedSurfaces:
+    """What is seen of some frames, solved with this model or with one that was edited since."""
+    animation = model.animation
+    assert animation is not None
+    return DeformedSurfaces(
+        model,
+        frames,
+        lambda actor, frame: animation.actors[actor].skin(frame),
+        {name: (np.array(moments), places) for name, (moments, places) in before.moved.items()},
+        {name: animation.objects[name].thing.vertices for name in before.moved},
+    )
+
+
 def _report(
     solved: SolveResult, before: StartFrame, table: ContactTable, request: SolveSpecification, notes: list[str]
 ) -> Simulation:
     """All that is told of solved frames."""
-    model, animation = solved.model, solved.model.animation
-    assert animation is not None
-    surfaces = DeformedSurfaces(
-        model,
-        solved.frames,
-        lambda actor, frame: animation.actors[actor].skin(frame),
-        {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()},
-        {name: animation.objects[name].thing.vertices for name in before.moved},
-    )
+    model = solved.model
+    surfaces = _surfaces(model, solved.frames, before)
 
     def slopes(actor: str, frame: float, forces: Mapping[str, float]) -> Mapping[str, DigitSlopes] | None:
         known = solved.equilibria.get(frame)

@@ -14,11 +14,14 @@ from warpjld.page.server import guarded_server, stop
 from warpjld.studio.background import JobProgress
 from warpjld.studio.panels.curves import CurvesPanel
 from warpjld.studio.panels.drag import DragPanel
+from warpjld.studio.panels.files import FilesPanel
+from warpjld.studio.panels.ghosts import GhostsPanel
 from warpjld.studio.panels.menus import MenusPanel
 from warpjld.studio.panels.messages import MessagesPanel
 from warpjld.studio.panels.pose_tools import PoseToolsPanel
 from warpjld.studio.panels.progress import ProgressPanel
 from warpjld.studio.panels.script import ScriptPanel
+from warpjld.studio.panels.selected import SelectedPanel
 from warpjld.studio.panels.skin import SkinPanel
 from warpjld.studio.panels.sliders import SlidersPanel
 from warpjld.studio.panels.stage import StagePanel
@@ -92,13 +95,13 @@ class Room:
         self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs: seen wherever one is
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
-            pose: list[Any] = [StagePanel(self), PoseToolsPanel(self), DragPanel(self)]
-            self.things = ThingsPanel(self)
-            pose += [self.things, SkinPanel(self), SlidersPanel(self)]
+            self.stage, ghosts, pose = StagePanel(self), GhostsPanel(self), PoseToolsPanel(self)
+            self.drag, self.things, self.skin = DragPanel(self), ThingsPanel(self), SkinPanel(self)
+            selected, sliders = SelectedPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
             script = ScriptPanel(self)
         with tabs.add_tab("Work"):
-            work = WorkPanel(self)
+            files, work = FilesPanel(self), WorkPanel(self)
         with tabs.add_tab("Menus"):
             menus = MenusPanel(self)
         below = gui.add_panel()
@@ -107,7 +110,8 @@ class Room:
         with below.add_tab("Keys"):
             curves = CurvesPanel(self)
         below.dock_below(gui.main_panel)
-        self.panels = [*pose, script, work, menus, timeline, curves, self.progress, messages]
+        posing = [self.stage, ghosts, pose, self.drag, self.things, self.skin, selected, sliders]
+        self.panels = [*posing, script, files, work, menus, timeline, curves, self.progress, messages]
 
     def _beside(self, text: str, then: Callable[[], object]) -> None:
         """Run a text that searches for grasps in the background, and then go on."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.errors import InputError, WarpjldError
 from warpjld.script.scene import Actor, Scene
@@ -40,6 +41,7 @@ class StudioState:
         broken: Whether the script as it stands cannot be run.
         messages: What commands said last.
         coloring: What skin is coloured by.
+        joint: The joint that is selected, of the actor that sliders move.
         solved: The contact that was solved last.
         preview: A scene that is shown in place of the script's, as long as the script stays as it is.
         defer: Has a text that searches for grasps run beside, and then what shall follow; None where this one waits.
@@ -60,6 +62,7 @@ class StudioState:
         self.broken = False
         self.messages: deque[str] = deque(maxlen=_MESSAGES)
         self.coloring: Coloring = "skin"
+        self.joint: str | None = None
         self.solved: Pressed | None = None
         self.preview: tuple[str, Scene] | None = None
         self.defer: Callable[[str, Callable[[], object]], None] | None = None
@@ -104,6 +107,12 @@ class StudioState:
         found = [key for actor in scene.actors.values() for key in actor.key_frames]
         return sorted({*found, *(key for prop in scene.props.values() for key in prop.key_frames)})
 
+    def neighbours(self) -> dict[str, float]:
+        """The keys ``before`` and ``after`` the frame that is shown, where there are any."""
+        before = [key for key in self.keys if key < self.frame][-1:]
+        after = [key for key in self.keys if key > self.frame][:1]
+        return {which: keys[0] for which, keys in (("before", before), ("after", after)) if keys}
+
     def channels(self) -> dict[str, tuple[float, float]]:
         """Channels of the actor that may move, with their limits in degrees."""
         actor = self.actor
@@ -135,7 +144,14 @@ class StudioState:
         solved = self.pressed
         if solved is None:
             return self.surfaces.at(self.scene, self.frame, self.coloring)
-        return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.simulation.surfaces)
+        return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.surfaces)
+
+    def contacts(self) -> NDArray[np.float32]:
+        """Points where something presses at the frame that is shown [m], shape (n, 3); none where none is solved."""
+        solved = self.pressed
+        if solved is None:
+            return np.zeros((0, 3), np.float32)
+        return self.surfaces.contacts(solved.scene, self.frame, solved.surfaces)
 
     @property
     def pressed(self) -> Pressed | None:
@@ -213,8 +229,10 @@ class StudioState:
             self._run()
         return done
 
-    def open(self, document: ScriptDocument) -> None:
-        """Another script."""
+    def open(self, document: ScriptDocument, within: Sequence[Path] | None = None) -> None:
+        """Another script; files may be read from other folders than before where they are given."""
+        if within is not None:
+            self.performance = Performance(self.folder, say=self.messages.append, within=within)
         self.document = document
         self.frame, self._actor = 0.0, None
         self._run()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["ContactRow", "ContactTable", "digit_rows", "write_table"]
+__all__ = ["ContactRow", "ContactTable", "JointOpening", "digit_rows", "write_table"]
 
 
 Slopes = Callable[[str, float, Mapping[str, float]], Mapping[str, DigitSlopes] | None]
@@ -71,6 +72,25 @@ class ContactRow:
     sliding: float
     state: str
     short_deg: float = 0.0
+
+
+@dataclass(frozen=True)
+class JointOpening:
+    """A joint that should be opened, so that muscles can bear a digit's force.
+
+    Attributes:
+        actor: Whose.
+        frame: Where it strains most.
+        joint: Its name; empty where no joint is known that would help.
+        degrees: How far to open it.
+        text: The same, and why.
+    """
+
+    actor: str
+    frame: float
+    joint: str
+    degrees: float
+    text: str
 
 
 class ContactTable:
@@ -128,14 +148,16 @@ class ContactTable:
                 )
         return out
 
-    def suggestions(self, model: ContactModel, slopes: Slopes = lambda actor, frame, forces: None) -> list[str]:
+    def suggestions(
+        self, model: ContactModel, slopes: Slopes = lambda actor, frame, forces: None
+    ) -> list[JointOpening]:
         """What to open, at the frame that strains an actor most, as the animation is after all.
 
         Args:
             model: As it is after all edits.
             slopes: How forces of an actor's digits follow their joints at a frame; None where that is not known.
         """
-        out = []
+        out: list[JointOpening] = []
         for hand in model.hands:
             efforts = self._efforts.get(hand.name, [])
             if not efforts or not hand.bones.bendable:
@@ -151,7 +173,10 @@ class ContactTable:
             )
             angles = hand.bones.animation.angles(frame)
             found = suggestions(hand.bones.skeleton, effort, angles, now, before if worst else None)
-            out += [f"{hand.name} at frame {frame:g}: {one.text}" for one in found]
+            for one in found:
+                joint = f"{one.digit}.{one.joint.replace(' ', '')}" if one.joint else ""
+                text = f"{hand.name} at frame {frame:g}: {one.text}"
+                out.append(JointOpening(hand.name, frame, joint, math.degrees(one.opening), text))
         return out
 
 

@@ -49,13 +49,15 @@ class ProgressPanel:
             what: Its name.
             work: Does it.
             told: Gets the result.
-            failed: Gets what was raised; the message is shown in any case.
+            failed: Gets what was raised, or that it was cancelled; the message is shown in any case.
 
         Raises:
             InputError: Something is being done already.
         """
 
         def show(result: object, error: BaseException | None) -> None:
+            if result is None and error is None and failed is not None:
+                error = InputError(f"{what} was cancelled")
             if error is not None:
                 if failed is not None:
                     failed(error)
