@@ -29,10 +29,12 @@ class RequestGuard:
     Attributes:
         host: The address that is listened on.
         token: What pages must bring along, in the address or as the cookie they then get; None for nothing.
+        framed: Whether other pages of this machine, such as notebooks, may show it inside them.
     """
 
     host: str
     token: str | None = None
+    framed: bool = False
 
     def refuses(self, path: str, headers: Mapping[str, str]) -> str | None:
         """Why a request for this path with these headers is refused; None where it is not."""
@@ -54,6 +56,11 @@ class RequestGuard:
         if self.token is None or not _same(_token_in(path), self.token):
             return None
         return f"{_COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+
+    @property
+    def ancestors(self) -> str:
+        """Pages that may show it inside them, as browsers are told."""
+        return "frame-ancestors 'self'" + (" http://localhost:* http://127.0.0.1:*" if self.framed else "")
 
     def _is_mine(self, host: str) -> bool:
         try:
@@ -113,7 +120,7 @@ def _first(guard: RequestGuard, answer: Callable[[Any, Any], Any]) -> Callable[[
         response = answer(connection, request)
         cookie = guard.cookie(request.path)
         if response is not None:
-            response.headers["X-Frame-Options"] = "SAMEORIGIN"
+            response.headers["Content-Security-Policy"] = guard.ancestors
             response.headers["Referrer-Policy"] = "no-referrer"
             if cookie is not None:
                 response.headers["Set-Cookie"] = cookie

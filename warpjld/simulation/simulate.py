@@ -21,6 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,9 @@ from warpjld.simulation.bodies.flesh_body import build_flesh_body
 from warpjld.simulation.bodies.model import ContactModel, assemble_model
 from warpjld.simulation.bodies.object_body import build_object_body
 from warpjld.simulation.bodies.skin_obstacle import bystanders
+from warpjld.simulation.display.solved_surfaces import surfaces_of_frames, view_of_frames
 from warpjld.simulation.display.surfaces import DeformedSurfaces
+from warpjld.simulation.display.visible_pressure import VisiblePressure
 from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.find import FoundGrip
@@ -53,28 +56,16 @@ from warpjld.simulation.solve_frames import Progress, solve_frames
 from warpjld.simulation.solve_result import SolveResult
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 
-__all__ = ["KEPT", "Keep", "Simulation", "VisiblePressure", "simulate"]
+if TYPE_CHECKING:
+    from warpjld.page.view import SurfaceView
+
+__all__ = ["KEPT", "Keep", "Simulation", "simulate"]
 
 KEPT = "contact-state.npz"
 """State file of a run that asked for none, where what it solved would be lost."""
 
 Keep = Callable[[], Path | None]
 """Keeps what is solved so far; see ``simulate``."""
-
-
-@dataclass(frozen=True, eq=False)
-class VisiblePressure:
-    """Contact pressure on a visible surface at a frame.
-
-    Attributes:
-        vertices: Of the surface, split where anything ever presses on it [m], shape (V, 3); the first are its own.
-        triangles: Shape (T, 3).
-        pressure: [Pa], shape (V,); its integral over the surface is the force that presses.
-    """
-
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int32]
-    pressure: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +184,15 @@ class Simulation:
             raise InputError(f"{actor} feels nothing: {self.solved.message}")
         return tactile_readings(self.model, hands[0], self.solved.frames)
 
+    def show(self) -> SurfaceView:
+        """The frames that were solved, in the colours of pressure, for a notebook to show (extra ``studio``).
+
+        Raises:
+            InputError: None was solved.
+            MissingExtraError: viser is not installed.
+        """
+        return view_of_frames(self.surfaces)
+
     def _span(self, name: str) -> slice:
         if name not in self.model.spans:
             raise InputError(f"name: nothing called {name} deforms here; there are {', '.join(self.model.spans)}")
@@ -256,7 +256,7 @@ def simulate(
     def watch(driven: ContactModel, frame: SolvedFrame) -> str | None:
         reason = table.add(driven, frame)
         done.append(frame)
-        showing(_surfaces(driven, done.copy(), before))
+        showing(surfaces_of_frames(driven, done.copy(), before))
         return reason if request.stop else None
 
     frames = _frames(specification, request, model.start)
@@ -313,25 +313,12 @@ def _frames(specification: ContactSpecification, request: SolveSpecification, st
     return sorted(f for f in frames if f > start)
 
 
-def _surfaces(model: ContactModel, frames: Sequence[SolvedFrame], before: StartFrame) -> DeformedSurfaces:
-    """What is seen of some frames, solved with this model or with one that was edited since."""
-    animation = model.animation
-    assert animation is not None
-    return DeformedSurfaces(
-        model,
-        frames,
-        lambda actor, frame: animation.actors[actor].skin(frame),
-        {name: (np.array(moments), places) for name, (moments, places) in before.moved.items()},
-        {name: animation.objects[name].thing.vertices for name in before.moved},
-    )
-
-
 def _report(
     solved: SolveResult, before: StartFrame, table: ContactTable, request: SolveSpecification, notes: list[str]
 ) -> Simulation:
     """All that is told of solved frames."""
     model = solved.model
-    surfaces = _surfaces(model, solved.frames, before)
+    surfaces = surfaces_of_frames(model, solved.frames, before)
 
     def slopes(actor: str, frame: float, forces: Mapping[str, float]) -> Mapping[str, DigitSlopes] | None:
         known = solved.equilibria.get(frame)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from warpjld.studio.background import JobProgress
     from warpjld.studio.state import StudioState
 
-__all__ = ["Pressed", "made", "opened", "pressed"]
+__all__ = ["Pressed", "made", "open_joints", "pressed"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def pressed(
     text: str,
     scene: Scene,
     progress: JobProgress,
-    showing: Callable[[Pressed], object] = lambda so_far: None,
+    showing: Callable[[Pressed], None] = lambda so_far: None,
 ) -> Pressed:
     """Do what PRESS asks for; ``showing`` is told of it after each frame.
 
@@ -67,7 +67,7 @@ def pressed(
     return Pressed(text, scene, found.surfaces, found)
 
 
-def opened(state: StudioState, openings: Sequence[JointOpening]) -> bool:
+def open_joints(state: StudioState, openings: Sequence[JointOpening]) -> bool:
     """Open the joints that a verdict suggests, each at its frame; False where the script could not be changed."""
     text, current = state.document.text, state.scene.current
     for one in openings:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,9 @@ __all__ = ["pose_sheet"]
 _CELL = (96, 112)  # pixels
 _COLUMNS = 4
 _VERTICES = 1500
-_SIDE = "left"
+_SIDE: Literal["left"] = "left"
+_PALM, _FINGERS = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
+"""Of the hand that is shown, and where its palm and its fingers point."""
 
 
 def pose_sheet(poses: Mapping[str, Mapping[str, float]]) -> NDArray[np.uint8]:
@@ -32,7 +35,7 @@ def pose_sheet(poses: Mapping[str, Mapping[str, float]]) -> NDArray[np.uint8]:
     covering = _covering()
     angles = np.stack([_angles(covering, pose) for pose in poses.values()])
     vertices = covering.deform(poses_from_angles(covering.skeleton, angles))
-    camera = render.Camera.view("palmar", vertices, side=_SIDE, size=_CELL)
+    camera = render.Camera.view("palmar", vertices, forward=_PALM, up=_FINGERS, side=_SIDE, size=_CELL)
     cells = []
     with render.SceneRenderer(covering.surface.faces, camera, look="shaded", size=_CELL) as stage:
         for name, points in zip(poses, vertices, strict=True):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.files.names import check_name
@@ -88,8 +89,12 @@ class PoseToolsPanel:
         """Pictures of all poses there are, as they are now."""
         own = {name: load_pose(self._folder().parent / name) for name in self.pose.options if name not in SHIPPED}
         poses = {name: shipped_pose(name) for name in SHIPPED} | {Path(name).stem: one for name, one in own.items()}
-        self.sheet.image = pose_sheet(poses)
-        self.sheet.visible = True
+
+        def show(sheet: NDArray[np.uint8]) -> None:
+            self.sheet.image = sheet
+            self.sheet.visible = True
+
+        self._room.progress.start("the pictures", lambda progress: pose_sheet(poses), show)
 
     def _save(self) -> None:
         state = self._room.state

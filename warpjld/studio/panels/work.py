@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from warpjld.errors import InputError
 from warpjld.studio.background import JobProgress
 from warpjld.studio.fitting import fitted
-from warpjld.studio.making import Pressed, made, opened, pressed
+from warpjld.studio.making import Pressed, made, open_joints, pressed
 
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
@@ -67,7 +67,7 @@ class WorkPanel:
         return () if solved is None or solved.simulation is None else solved.simulation.verdict.openings
 
     def _open(self) -> None:
-        opened(self._room.state, self._openings())
+        open_joints(self._room.state, self._openings())
 
     def _run(self) -> None:
         state = self._room.state
