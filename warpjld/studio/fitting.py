@@ -11,10 +11,12 @@ from warpjld.script.scene import Scene
 if TYPE_CHECKING:
     from warpjld.studio.background import JobProgress
 
-__all__ = ["fitted"]
+__all__ = ["fit_skin"]
 
 
-def fitted(scene: Scene, name: str, path: Path, progress: JobProgress, poses: int | None = None) -> tuple[float, float]:
+def fit_skin(
+    scene: Scene, name: str, path: Path, progress: JobProgress, poses: int | None = None
+) -> tuple[float, float]:
     """Fit, and write the parameter file; the loss before and after.
 
     Args:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
 from warpjld.studio.background import JobProgress
-from warpjld.studio.fitting import fitted
+from warpjld.studio.fitting import fit_skin
 from warpjld.studio.making import Pressed, made, open_joints, pressed
 
 if TYPE_CHECKING:
@@ -117,4 +117,4 @@ class WorkPanel:
             speak = "" if state.scene.current == name else f"ACTOR {name}\n"
             state.do(f'{speak}PARAMETERS "{path.name}"')
 
-        self._room.progress.start("calibration", lambda progress: fitted(scene, name, path, progress), told)
+        self._room.progress.start("calibration", lambda progress: fit_skin(scene, name, path, progress), told)
