@@ -142,5 +142,5 @@ def test_muscles_stop_and_suggest_by_what_bones_bear(bending: Bending, monkeypat
         f"stopped at frame {solved.frame:g}: more than muscles can do: left.index {borne:.3g} N of"
     )
     (found,) = table.suggestions(bending.bodies)
-    assert f"left.index {borne:.3g} N of 1 N" in found
-    assert "open " in found
+    assert f"left.index {borne:.3g} N of 1 N" in found.text
+    assert f"open {found.joint.split('.')[-1].replace('knuckle', 'knuckle ')} by {found.degrees:.1f}°" in found.text

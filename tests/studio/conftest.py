@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from warpjld.studio.document import ScriptDocument
 from warpjld.studio.opening import opened_document
 from warpjld.studio.room import Room
 
@@ -45,19 +46,25 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-@pytest.fixture(autouse=True)
-def kept(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+@pytest.fixture(autouse=True, scope="session")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """The hand is built, and bound, once for all of these tests."""
     folder = tmp_path_factory.getbasetemp() / "kept"
     folder.mkdir(exist_ok=True)
-    monkeypatch.setenv("WARPJLD_CACHE", str(folder))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("WARPJLD_CACHE", str(folder))
+        yield
+
+
+WAVE = "HAND LEFT BUILTIN RESOLUTION 1500\nJOINT left.index.base FLEXION AT 0 0\n"
+"""A small hand, and a key."""
 
 
 @pytest.fixture
 def script(tmp_path: Path) -> Path:
-    """A small hand, and a key."""
+    """That as a file."""
     path = tmp_path / "wave.jld"
-    path.write_text("HAND LEFT BUILTIN RESOLUTION 1500\nJOINT left.index.base FLEXION AT 0 0\n")
+    path.write_text(WAVE)
     return path
 
 
@@ -142,6 +149,22 @@ class Window:
         until(stays, "the slider stays where it was let go")
         return float(seen[-1])
 
+    def at(self, place: np.ndarray) -> tuple[float, float]:
+        """Where a place on the stage [m] is seen [pixels]."""
+        (client,) = self.room.server.get_clients().values()
+        camera = client.camera
+        ahead = np.asarray(camera.look_at) - np.asarray(camera.position)
+        ahead /= np.linalg.norm(ahead)
+        right = np.cross(ahead, (0.0, 1.0, 0.0))
+        right /= np.linalg.norm(right)
+        way = np.asarray(place) - np.asarray(camera.position)
+        box = self.page.locator("canvas").last.bounding_box()
+        scale = box["height"] / 2.0 / np.tan(camera.fov / 2.0) / (way @ ahead)
+        return (
+            float(box["x"] + box["width"] / 2.0 + scale * (way @ right)),
+            float(box["y"] + box["height"] / 2.0 - scale * (way @ np.cross(right, ahead))),
+        )
+
     def press(self, name: str) -> None:
         """Press a button."""
         self.page.get_by_role("button", name=name, exact=True).first.click()
@@ -158,9 +181,26 @@ def until(holds: Callable[[], bool], what: str, timeout: float = 60.0) -> None:
         assert time.monotonic() < end, f"in {timeout:g} s it did not come about that {what}"
 
 
-@pytest.fixture
-def window(browser: Any, room: Room) -> Iterator[Window]:
-    """One page of it."""
+@pytest.fixture(scope="module")
+def studio(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
+    """One studio and one page of it for all tests of a module."""
+    pytest.importorskip("viser", reason="viser is not installed")
+    script = tmp_path_factory.mktemp("studio") / "wave.jld"
+    script.write_text(WAVE)
+    room = Room(opened_document(script, script.parent / "out"), port=0)
     page = browser.new_page(viewport={"width": 900, "height": 800})
     yield Window(page, room)
     page.close()
+    room.stop()
+
+
+@pytest.fixture
+def window(studio: Window) -> Window:
+    """That page, with the script as it was at first."""
+    room, path = studio.room, studio.room.state.document.path
+    room.state.messages.clear()
+    room.post(lambda: room.state.open(ScriptDocument(path, WAVE)))
+    assert room.worker.settle()
+    studio.page.mouse.move(5, 5)
+    studio.tab("Pose")
+    return studio

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.studio.conftest import Window, until
 from warpjld.script import all_commands
 from warpjld.script.plugin import load_commands
-from warpjld.studio.opening import opened_document
-from warpjld.studio.room import Room
+from warpjld.script.staging import stage
+from warpjld.studio.reach_tips import tips
 from warpjld.studio.state import StudioState
 
 INDEX = "left.index.base.flexion"
@@ -33,10 +33,10 @@ def trick(scene, arguments):
 """
 
 
-@pytest.fixture
-def trick(tmp_path: Path) -> Iterator[None]:
-    """A user's command is there."""
-    path = tmp_path / "trick.py"
+@pytest.fixture(scope="module", autouse=True)
+def trick(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A user's command is there, before the studio is."""
+    path = tmp_path_factory.mktemp("commands") / "trick.py"
     path.write_text(TRICK)
     load_commands(path)
     yield
@@ -82,6 +82,7 @@ def test_a_key_is_set_scrubbed_past_and_deleted(window: Window) -> None:
     window.press("key ▸")
     until(lambda: state.frame == state.keys[-1], "the next key is shown")
     until(lambda: window.changed(straight) > 500, "the finger is drawn bent again")
+    until(lambda: window.changed(bent) == 0, "it is drawn as when the key was set, pixel by pixel")
     window.press("delete")
     until(lambda: state.keys == [0], "the key is gone")
     assert state.document.text.splitlines()[-1] == f"KEYS DELETE {state.frame:g} LEFT"
@@ -101,7 +102,7 @@ def test_what_is_typed_is_done_and_a_fault_is_shown_at_its_line(window: Window) 
     assert round(bend(state)) == 40
 
 
-def test_a_users_command_has_a_menu_entry_with_a_form(trick: None, window: Window) -> None:
+def test_a_users_command_has_a_menu_entry_with_a_form(window: Window) -> None:
     state, page = window.room.state, window.page
     before = window.still()
     window.tab("Menus")
@@ -136,47 +137,100 @@ def test_two_windows_show_the_same_and_a_closed_one_or_a_reload_loses_nothing(wi
     assert abs(float(value) - bend(state)) < 0.5
 
 
-def test_the_page_asks_nothing_of_other_machines(browser: Any, room: Any) -> None:
+def test_the_page_asks_nothing_of_other_machines(browser: Any, studio: Window) -> None:
     page = browser.new_page()
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.on("websocket", lambda socket: asked.append(socket.url))
-    page.goto(room.address)
+    page.goto(studio.room.address)
     page.get_by_text("Joints", exact=True).wait_for()
     page.close()
-    host = room.address.removeprefix("http://")
+    host = studio.room.address.removeprefix("http://")
     assert len(asked) >= 2
     assert all(url.split("://")[-1].startswith(host.rstrip("/")) or url.startswith(("data:", "blob:")) for url in asked)
 
 
+def index_tip(state: StudioState) -> np.ndarray:
+    """Where the tip of the index is [m], shape (3,)."""
+    assert state.actor is not None
+    return stage(state.actor, np.array([state.frame]), state.scene.rate).positions[0][
+        tips(state.actor, "left")["index"]
+    ]
+
+
 @SLOW
-def test_contact_is_solved_beside_and_seen_in_colours(browser: Any, tmp_path: Path) -> None:
-    script = tmp_path / "plate.jld"
-    script.write_text(
-        "HAND LEFT BUILTIN RESOLUTION 1500\nFRAMES 0 10\nOBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\n"
-        "MOVE LEFT 0 0 0.003 0\nMOVE LEFT 10 0 -0.0055 0\nFLESH LEFT INDEX ELEMENT 0.005\nPRESS 0 10 EVERY 5\n"
-    )
-    room = Room(opened_document(script, tmp_path / "out"), port=0)
-    page = browser.new_page(viewport={"width": 900, "height": 800})
-    try:
-        window = Window(page, room)
-        room.post(lambda: setattr(room.state, "frame", 10.0))
-        window.tab("Work")
-        window.press("PRESS: solve contact")
-        page.locator("#studio-verdict").wait_for(timeout=240_000)
-        assert room.state.pressed is not None
-        assert "kPa" in page.locator("#studio-verdict").inner_text()
-        window.tab("Pose")
-        page.get_by_label("Objects", exact=True).uncheck()  # the plate lies before what it presses
-        eye, tip = (0.06, -0.11, -0.22), (0.034, -0.018, -0.162)  # at the pad
-        for client in room.server.get_clients().values():
-            client.camera.position, client.camera.look_at = eye, tip
+def test_a_click_selects_the_joint_and_a_dragged_fingertip_bends_its_finger(window: Window) -> None:
+    state, room, mouse = window.room.state, window.room, window.page.mouse
+    assert state.actor is not None
+    joints = stage(state.actor, np.zeros(1), 30.0).positions[0]
+    names = state.actor.skeleton.names
+    middle = (joints[names.index("left.index.knuckle2")] + joints[names.index("left.index.knuckle3")]) / 2.0
+    mouse.click(*window.at(middle))
+    until(lambda: state.joint == "left.index.knuckle2", "the joint under the pointer is selected")
+    assert room.worker.settle()
+    before, tip = window.still(), index_tip(state)
+    (handle,) = [one for name, one in room.server.scene._handle_from_node_name.items() if name == "/tip"]
+    grip = tip + np.array([0.0, 0.6 * handle.scale, 0.0])
+    mouse.move(*window.at(grip))
+    mouse.down()
+    mouse.move(*window.at(grip - np.array([0.0, 0.03, 0.0])), steps=6)
+    mouse.up()
+    until(lambda: np.linalg.norm(index_tip(state) - tip) > 0.01, "the tip is dragged away")
+    assert room.worker.settle()
+    lines = state.document.text.splitlines()[2:]
+    assert lines
+    assert all(line.startswith("JOINT left.index.") for line in lines)
+    until(lambda: window.changed(before) > 300, "the finger is drawn bent")
+    for name, degrees in state.angles().items():
+        low, high = state.channels()[name]
+        assert low <= degrees <= high
+    room.post(lambda: room.state.undo())
+    until(lambda: np.linalg.norm(index_tip(state) - tip) < 1e-9, "it is undone in one step")
 
-        def red() -> bool:
-            pixels = window.pixels()
-            return int(((pixels[..., 0] > 100) & (pixels[..., 1] < 0.6 * pixels[..., 0])).sum()) > 20
 
-        until(red, "pressure is seen on the pad")
-    finally:
-        page.close()
-        room.stop()
+PLATE = """HAND LEFT BUILTIN RESOLUTION 1500
+FRAMES 0 10
+OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
+MOVE LEFT 0 0 0.003 0
+MOVE LEFT 10 0 -0.0055 0
+FLESH LEFT INDEX ELEMENT 0.005
+PRESS 0 10 EVERY 5
+"""
+
+
+@SLOW
+def test_a_cancelled_solve_ends_and_the_next_is_seen_in_colours_though_the_page_is_reloaded(window: Window) -> None:
+    room, state, page = window.room, window.room.state, window.page
+    room.post(lambda: state.write(PLATE))
+    assert room.worker.settle()
+    window.tab("Work")
+    window.press("PRESS: solve contact")
+    window.press("Cancel")
+    page.get_by_text("PRESS was cancelled").wait_for(timeout=120_000)
+    assert state.pressed is None
+    assert room.progress.work.running is None
+    window.press("PRESS: solve contact")
+    until(lambda: room.progress.work.running is not None, "it is being solved")
+    window.reload()
+    window.tab("Work")
+    page.locator("#studio-verdict").wait_for(timeout=240_000)
+    assert state.pressed is not None
+    assert "kPa" in page.locator("#studio-verdict").inner_text()
+    assert state.frame == 10
+    window.tab("Pose")
+    page.get_by_label("Objects", exact=True).uncheck()  # the plate lies before what it presses
+    for client in room.server.get_clients().values():
+        client.camera.position, client.camera.look_at = (0.06, -0.11, -0.22), (0.034, -0.018, -0.162)  # at the pad
+
+    def red() -> bool:
+        pixels = window.pixels()
+        return int(((pixels[..., 0] > 100) & (pixels[..., 1] < 0.6 * pixels[..., 0])).sum()) > 20
+
+    until(red, "pressure is seen on the pad")
+    page.get_by_label("Contact points", exact=True).check()
+
+    def green() -> bool:
+        pixels = window.pixels()
+        return int(((pixels[..., 1] > 120) & (pixels[..., 0] < 0.5 * pixels[..., 1])).sum()) > 20
+
+    until(green, "contact points are seen on it")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,9 @@ from warpjld.geometry.surface import Surface
 from warpjld.runtime.threads import threads_for
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
+
+if TYPE_CHECKING:
+    from warpjld.page.view import SurfaceView
 
 __all__ = ["Covering"]
 
@@ -222,6 +225,19 @@ class Covering:
         for start in range(0, len(poses), frames):
             block = poses[start : start + frames]
             yield start, self.deform(block, device=device, threads=threads, out=buffer[: len(block)], order=order)
+
+    def show(self, poses: Poses | None = None, *, rate: float = 25.0) -> SurfaceView:
+        """The surface in poses, at rest where none are given, for a notebook to show (extra ``studio``).
+
+        Raises:
+            InputError: Poses of another skeleton, or none.
+            MissingExtraError: viser is not installed.
+        """
+        from warpjld.page.view import SurfaceView, ViewedSurface
+        from warpjld.skeleton.kinematics import rest_poses
+
+        frames = self.deform(rest_poses(self.skeleton) if poses is None else poses)
+        return SurfaceView([[ViewedSurface("surface", one, self.surface.faces)] for one in frames], rate=rate)
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""

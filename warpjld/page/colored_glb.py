@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.normals import vertex_normals
+from warpjld.page.visible_side import visible_side
+
 __all__ = ["colored_glb"]
 
 
@@ -15,13 +18,14 @@ def colored_glb(vertices: NDArray[np.float32], faces: NDArray[np.int32], colors:
     places = np.ascontiguousarray(vertices, np.float32)
     arrays = [
         (places, g.ARRAY_BUFFER, g.FLOAT, g.VEC3),
-        (_normals(places, faces), g.ARRAY_BUFFER, g.FLOAT, g.VEC3),
+        (vertex_normals(places, faces), g.ARRAY_BUFFER, g.FLOAT, g.VEC3),
         (_linear(colors), g.ARRAY_BUFFER, g.FLOAT, g.VEC3),
         (np.ascontiguousarray(faces, np.uint32).ravel(), g.ELEMENT_ARRAY_BUFFER, g.UNSIGNED_INT, g.SCALAR),
     ]
     model = g.GLTF2(scene=0, scenes=[g.Scene(nodes=[0])], nodes=[g.Node(mesh=0)])
+    double = visible_side(places, faces) == "double"
     matt = g.PbrMetallicRoughness(metallicFactor=0.0, roughnessFactor=0.9)
-    model.materials.append(g.Material(pbrMetallicRoughness=matt, doubleSided=True))
+    model.materials.append(g.Material(pbrMetallicRoughness=matt, doubleSided=double))
     attributes = g.Attributes(POSITION=0, NORMAL=1, COLOR_0=2)
     model.meshes.append(g.Mesh(primitives=[g.Primitive(attributes=attributes, indices=3, material=0)]))
     data = b""
@@ -33,17 +37,6 @@ def colored_glb(vertices: NDArray[np.float32], faces: NDArray[np.int32], colors:
     model.buffers.append(g.Buffer(byteLength=len(data)))
     model.set_binary_blob(data)
     return b"".join(model.save_to_bytes())
-
-
-def _normals(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Unit normals of the vertices, by the areas of the triangles around."""
-    a, b, c = (vertices[faces[:, k]].astype(np.float64) for k in range(3))
-    across = np.cross(b - a, c - a)
-    total = np.stack(
-        [np.bincount(faces.ravel(), np.repeat(across[:, k], 3), minlength=len(vertices)) for k in range(3)], axis=1
-    )
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.where(length > 0.0, total / np.maximum(length, 1e-300), [0.0, 1.0, 0.0]).astype(np.float32)
 
 
 def _linear(colors: NDArray[np.uint8]) -> NDArray[np.float32]:

@@ -28,10 +28,12 @@ class RequestGuard:
     Attributes:
         host: The address that the server listens on.
         token: Token that pages must send, in the address or as the cookie they then get; None: no token needed.
+        framed: Whether pages of this machine, such as notebooks, may show it in a frame.
     """
 
     host: str
     token: str | None = None
+    framed: bool = False
 
     def refuses(self, path: str, headers: Mapping[str, str]) -> str | None:
         """Reason to refuse a request for this path with these headers; None to accept it."""
@@ -53,6 +55,11 @@ class RequestGuard:
         if self.token is None or not _same(_token_in(path), self.token):
             return None
         return f"{_COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+
+    @property
+    def ancestors(self) -> str:
+        """Pages that may show it inside them, as browsers are told."""
+        return "frame-ancestors 'self'" + (" http://localhost:* http://127.0.0.1:*" if self.framed else "")
 
     def _is_mine(self, host: str) -> bool:
         try:
@@ -114,7 +121,7 @@ def _first(guard: RequestGuard, answer: Callable[[Any, Any], Any]) -> Callable[[
         response = answer(connection, request)
         cookie = guard.cookie(request.path)
         if response is not None:
-            response.headers["X-Frame-Options"] = "SAMEORIGIN"
+            response.headers["Content-Security-Policy"] = guard.ancestors
             response.headers["Referrer-Policy"] = "no-referrer"
             if cookie is not None:
                 response.headers["Set-Cookie"] = cookie

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
     from warpjld.simulation.animation import AngleEdit
+    from warpjld.simulation.display.surfaces import DeformedSurfaces
     from warpjld.simulation.simulate import Keep, Simulation
     from warpjld.skeleton import Poses, Skeleton
 
@@ -47,6 +48,7 @@ def run_contact(
     folder: Path,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     keeping: Callable[[Keep], None] = lambda keep: None,
+    showing: Callable[[DeformedSurfaces], None] = lambda surfaces: None,
 ) -> Simulation:
     """Run the simulation that ``PRESS`` specifies; grips found and angles corrected become keys of the actors.
 
@@ -68,7 +70,9 @@ def run_contact(
         asked = replace(
             scene.contact, grasped=tuple(dict.fromkeys(grasps)), pressing=replace(pressing, rate=scene.rate)
         )
-        found = simulate(asked, SceneAnimation(scene), folder=folder, keeping=keeping, progress=progress)
+        found = simulate(
+            asked, SceneAnimation(scene), folder=folder, keeping=keeping, showing=showing, progress=progress
+        )
     except InputError as error:
         raise located(error, pressing.where) from error
     for edit in found.solved.edits:

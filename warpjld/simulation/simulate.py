@@ -21,6 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,9 @@ from warpjld.simulation.bodies.flesh_body import build_flesh_body
 from warpjld.simulation.bodies.model import ContactModel, assemble_model
 from warpjld.simulation.bodies.object_body import build_object_body
 from warpjld.simulation.bodies.skin_obstacle import bystanders
+from warpjld.simulation.display.solved_surfaces import surfaces_of_frames, view_of_frames
 from warpjld.simulation.display.surfaces import DeformedSurfaces
+from warpjld.simulation.display.visible_pressure import VisiblePressure
 from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.find import FoundGrip
@@ -53,29 +56,16 @@ from warpjld.simulation.solve_frames import Progress, solve_frames
 from warpjld.simulation.solve_result import SolveResult
 from warpjld.simulation.specification import ContactSpecification, SolveSpecification
 
-__all__ = ["KEPT", "Keep", "Simulation", "VisiblePressure", "simulate"]
+if TYPE_CHECKING:
+    from warpjld.page.view import SurfaceView
+
+__all__ = ["KEPT", "Keep", "Simulation", "simulate"]
 
 KEPT = "contact-state.npz"
 """Name of the state file of a run that asked for none, written on request so that its frames are not lost."""
 
 Keep = Callable[[], Path | None]
 """Writes the frames solved so far into the state file and returns its path; see ``simulate``."""
-
-
-@dataclass(frozen=True, eq=False)
-class VisiblePressure:
-    """Contact pressure on a visible surface at a frame.
-
-    Attributes:
-        vertices: Vertices of the surface, refined where it is ever in contact [m], shape (V, 3); the original ones
-            come first.
-        triangles: Triangles of the refined surface, shape (T, 3).
-        pressure: [Pa], shape (V,); its integral over the surface is the normal contact force.
-    """
-
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int32]
-    pressure: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +185,15 @@ class Simulation:
             raise InputError(f"no tactile readings of {actor}, as no frame was solved: {self.solved.message}")
         return tactile_readings(self.model, hands[0], self.solved.frames)
 
+    def show(self) -> SurfaceView:
+        """The frames that were solved, in the colours of pressure, for a notebook to show (extra ``studio``).
+
+        Raises:
+            InputError: None was solved.
+            MissingExtraError: viser is not installed.
+        """
+        return view_of_frames(self.surfaces)
+
     def _span(self, name: str) -> slice:
         if name not in self.model.spans:
             raise InputError(f"name: nothing called {name} deforms here; there are {', '.join(self.model.spans)}")
@@ -208,6 +207,7 @@ def simulate(
     *,
     folder: Path = Path(),
     keeping: Callable[[Keep], None] = lambda keep: None,
+    showing: Callable[[DeformedSurfaces], None] = lambda surfaces: None,
     progress: Progress = lambda what, done, total: None,
 ) -> Simulation:
     """Solve contact over the frames of an animation and evaluate the results.
@@ -221,6 +221,7 @@ def simulate(
         keeping: Called once before the first frame with a function that may be called at any time: it writes the frames
             solved so far into the state file (``KEPT`` if none was asked for) and returns its path, or None if there is
             nothing to resume from.
+        showing: Called after each frame with the surfaces of the frames solved so far.
         progress: Called with what is being done, how much is done and how much there is.
 
     Returns:
@@ -251,9 +252,12 @@ def simulate(
     progress("meshing", 0, 1)
     model, notes = _model(specification, animation, before)
     table = ContactTable(specification.strength, animation)
+    done: list[SolvedFrame] = []
 
     def watch(driven: ContactModel, frame: SolvedFrame) -> str | None:
         reason = table.add(driven, frame)
+        done.append(frame)
+        showing(surfaces_of_frames(driven, done.copy(), before))
         return reason if request.stop else None
 
     frames = _frames(specification, request, model.start)
@@ -314,15 +318,8 @@ def _report(
     solved: SolveResult, before: StartFrame, table: ContactTable, request: SolveSpecification, notes: list[str]
 ) -> Simulation:
     """Surfaces, table, verdict and notes of the solved frames."""
-    model, animation = solved.model, solved.model.animation
-    assert animation is not None
-    surfaces = DeformedSurfaces(
-        model,
-        solved.frames,
-        lambda actor, frame: animation.actors[actor].skin(frame),
-        {name: (np.array(frames), places) for name, (frames, places) in before.moved.items()},
-        {name: animation.objects[name].thing.vertices for name in before.moved},
-    )
+    model = solved.model
+    surfaces = surfaces_of_frames(model, solved.frames, before)
 
     def slopes(actor: str, frame: float, forces: Mapping[str, float]) -> Mapping[str, DigitSlopes] | None:
         known = solved.equilibria.get(frame)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import threading
 from collections.abc import Callable
 
@@ -9,9 +10,12 @@ __all__ = ["Background", "JobProgress"]
 
 JobProgress = Callable[[str, int, int], None]
 
+_PATIENCE = 1.0
+"""How long cancelled work may go on without telling of its progress before it is interrupted where it is [s]."""
+
 
 class _CancelledError(BaseException):
-    """Raised in the work where it tells of its progress; nothing that handles errors stops it."""
+    """Raised in cancelled work; nothing that handles errors stops it."""
 
 
 class Background:
@@ -27,6 +31,8 @@ class Background:
         self._changed = changed
         self._cancel = threading.Event()
         self._thread: threading.Thread | None = None
+        self._inside = False
+        self._guard = threading.Lock()
         self.running: str | None = None
         self.done = 0.0
         self.step = ""
@@ -45,17 +51,25 @@ class Background:
         return True
 
     def cancel(self) -> None:
-        """End the work at the next step that it tells of."""
+        """End the work at the next step that it tells of, or where it is after a while, as Ctrl-C would."""
         self._cancel.set()
+        timer = threading.Timer(_PATIENCE, self._interrupt, (self._thread,))
+        timer.daemon = True
+        timer.start()
 
     def _run(
         self, work: Callable[[JobProgress], object], ended: Callable[[object, BaseException | None], None]
     ) -> None:
         result, error = None, None
         try:
-            result = work(self._progress)
+            self._inside = True
+            try:
+                result = work(self._progress)
+            finally:
+                self._leave()
         except _CancelledError:
-            pass
+            self._leave()
+            result = None
         except BaseException as raised:  # it is shown, whatever it is
             error = raised
         self.running, self.done, self.step = None, 0.0, ""
@@ -66,3 +80,22 @@ class Background:
             raise _CancelledError
         self.step, self.done = what, done / total if total else 0.0
         self._changed()
+
+    def _interrupt(self, thread: threading.Thread | None) -> None:
+        """Raise in the thread if it still does the work."""
+        with self._guard:
+            if thread is self._thread and thread is not None and self._inside and self._cancel.is_set():
+                _raise_in(thread, _CancelledError)
+
+    def _leave(self) -> None:
+        """Nothing is raised in this thread from now on."""
+        with self._guard:
+            self._inside = False
+            _raise_in(threading.current_thread(), None)
+
+
+def _raise_in(thread: threading.Thread, error: type[BaseException] | None) -> None:
+    """Raise an error in a thread when it next runs Python; None takes back one that is not raised yet."""
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(
+        ctypes.c_ulong(thread.ident or 0), None if error is None else ctypes.py_object(error)
+    )

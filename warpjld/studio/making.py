@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,13 +13,17 @@ from warpjld.script.contact import check_contact, run_contact
 from warpjld.script.runner import run_scene
 from warpjld.script.scene import Scene
 from warpjld.script.staging import frame_numbers
+from warpjld.skeleton.channels import FLEXION
+from warpjld.studio.key_lines import with_keys
 
 if TYPE_CHECKING:
-    from warpjld.simulation.report.table import ContactRow
+    from warpjld.simulation.display.surfaces import DeformedSurfaces
+    from warpjld.simulation.report.table import ContactRow, JointOpening
     from warpjld.simulation.simulate import Simulation
     from warpjld.studio.background import JobProgress
+    from warpjld.studio.state import StudioState
 
-__all__ = ["Pressed", "made", "pressed"]
+__all__ = ["Pressed", "made", "open_joints", "pressed"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,22 +33,29 @@ class Pressed:
     Attributes:
         text: The script that was solved.
         scene: Its scene, including keys that grip searches found.
-        simulation: The result.
+        surfaces: Visible surfaces of the solved frames.
+        simulation: The result; None while frames are being solved.
     """
 
     text: str
     scene: Scene
-    simulation: Simulation
+    surfaces: DeformedSurfaces
+    simulation: Simulation | None = None
 
     def rows(self, frame: float) -> list[ContactRow]:
         """Contacts at the nearest solved frame."""
-        every = self.simulation.rows
+        every = [] if self.simulation is None else self.simulation.rows
         near = min({row.frame for row in every}, key=lambda one: abs(one - frame), default=frame)
         return [row for row in every if row.frame == near and row.force_n > 0.0]
 
 
-def pressed(text: str, scene: Scene, progress: JobProgress) -> Pressed:
-    """Solve the contact that PRESS specifies.
+def pressed(
+    text: str,
+    scene: Scene,
+    progress: JobProgress,
+    showing: Callable[[Pressed], None] = lambda so_far: None,
+) -> Pressed:
+    """Solve the contact that PRESS specifies; ``showing`` is called after each frame.
 
     Raises:
         InputError: There is no PRESS, or bodies that cannot be meshed or driven.
@@ -50,7 +63,22 @@ def pressed(text: str, scene: Scene, progress: JobProgress) -> Pressed:
     if scene.contact.pressing is None:
         raise InputError("nothing to solve: add a line such as PRESS 0 20 after FLESH or PHYSICAL")
     check_contact(scene, [], frame_numbers(scene))
-    return Pressed(text, scene, run_contact(scene, scene.folder, progress))
+    found = run_contact(scene, scene.folder, progress, showing=lambda surfaces: showing(Pressed(text, scene, surfaces)))
+    return Pressed(text, scene, found.surfaces, found)
+
+
+def open_joints(state: StudioState, openings: Sequence[JointOpening]) -> bool:
+    """Open the joints that a verdict suggests, each at its frame; False where the script could not be changed."""
+    text, current = state.document.text, state.scene.current
+    for one in openings:
+        channel = f"{one.joint}.flexion"
+        actor = state.scene.actor(one.actor)
+        degrees = math.degrees(actor.value(channel, one.frame)) - one.degrees
+        low = math.degrees(float(actor.skeleton.limits[actor.skeleton.index(one.joint), FLEXION, 0]))
+        speak = None if current == actor.name else actor.name
+        text = with_keys(text, {channel: max(degrees, low)}, one.frame, actor=speak)
+        current = actor.name
+    return state.put(text)
 
 
 def made(scene: Scene, script: Path, progress: JobProgress, device: str = "cpu") -> dict[str, Any]:

@@ -10,7 +10,7 @@ from warpjld.files.text_file import read_text
 from warpjld.studio.document import ScriptDocument
 from warpjld.studio.state import StudioState
 
-__all__ = ["opened_document"]
+__all__ = ["opened_document", "readable"]
 
 _NEW = "HAND LEFT BUILTIN\n"
 
@@ -33,7 +33,12 @@ def opened_document(path: Path | None, folder: Path, *, device: str = "cpu") -> 
         document = ScriptDocument(path.resolve().with_suffix(".jld"), _staging(path))
     if document.autosaved.is_file() and (kept := read_text(document.autosaved)) != document.text:
         document.edit(kept)  # the autosaved text of an earlier session; undo restores the file's text
-    return StudioState(document, folder, within=[document.path.parent, *_named(document)], device=device)
+    return StudioState(document, folder, within=readable(document), device=device)
+
+
+def readable(document: ScriptDocument) -> list[Path]:
+    """What a script may read: its folder, and the files that it names as it is opened."""
+    return [document.path.parent, *_named(document)]
 
 
 def _staging(path: Path) -> str:

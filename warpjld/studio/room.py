@@ -11,18 +11,24 @@ from typing import Any
 from warpjld.errors import WarpjldError
 from warpjld.page.guard import RequestGuard
 from warpjld.page.server import guarded_server, stop
+from warpjld.studio.background import JobProgress
 from warpjld.studio.panels.curves import CurvesPanel
 from warpjld.studio.panels.drag import DragPanel
+from warpjld.studio.panels.files import FilesPanel
+from warpjld.studio.panels.ghosts import GhostsPanel
 from warpjld.studio.panels.menus import MenusPanel
 from warpjld.studio.panels.messages import MessagesPanel
 from warpjld.studio.panels.pose_tools import PoseToolsPanel
+from warpjld.studio.panels.progress import ProgressPanel
 from warpjld.studio.panels.script import ScriptPanel
+from warpjld.studio.panels.selected import SelectedPanel
 from warpjld.studio.panels.skin import SkinPanel
 from warpjld.studio.panels.sliders import SlidersPanel
 from warpjld.studio.panels.stage import StagePanel
 from warpjld.studio.panels.things import ThingsPanel
 from warpjld.studio.panels.timeline import TimelinePanel
 from warpjld.studio.panels.work import WorkPanel
+from warpjld.studio.performance import Performance
 from warpjld.studio.state import StudioState
 from warpjld.studio.worker import Worker
 
@@ -52,6 +58,7 @@ class Room:
         self.panels: list[Any] = []
         self._kept = state.document.text
         self._furnish()
+        state.defer = self._beside
         shown = LOCAL if host in ("0.0.0.0", "::") else host
         shown = f"[{shown}]" if ":" in shown else shown
         self.address = f"http://{shown}:{self.server.get_port()}/" + (f"?token={token}" if token else "")
@@ -85,15 +92,16 @@ class Room:
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.set_panel_label("warpjld studio")
         gui.main_panel.dock_right()
-        messages = MessagesPanel(self)  # above all tabs: an error is seen wherever one is
+        self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs: seen wherever one is
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
-            pose = [StagePanel(self), PoseToolsPanel(self), DragPanel(self), ThingsPanel(self), SkinPanel(self)]
-            pose.append(SlidersPanel(self))
+            self.stage, ghosts, pose = StagePanel(self), GhostsPanel(self), PoseToolsPanel(self)
+            self.drag, self.things, self.skin = DragPanel(self), ThingsPanel(self), SkinPanel(self)
+            selected, sliders = SelectedPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
             script = ScriptPanel(self)
         with tabs.add_tab("Work"):
-            work = WorkPanel(self)
+            files, work = FilesPanel(self), WorkPanel(self)
         with tabs.add_tab("Menus"):
             menus = MenusPanel(self)
         below = gui.add_panel()
@@ -102,7 +110,27 @@ class Room:
         with below.add_tab("Keys"):
             curves = CurvesPanel(self)
         below.dock_below(gui.main_panel)
-        self.panels = [*pose, script, work, menus, timeline, curves, messages]
+        posing = [self.stage, ghosts, pose, self.drag, self.things, self.skin, selected, sliders]
+        self.panels = [*posing, script, files, work, menus, timeline, curves, self.progress, messages]
+
+    def _beside(self, text: str, then: Callable[[], object]) -> None:
+        """Run a text that searches for grasps in the background, and then go on."""
+        state = self.state
+        performance, path = state.performance.beside(), state.document.path
+
+        def work(progress: JobProgress) -> Performance:
+            performance.run(text, path, progress)
+            return performance
+
+        def told(ran: Performance) -> None:
+            state.performance.learn(ran)
+            then()
+
+        def failed(error: BaseException) -> None:
+            if isinstance(error, WarpjldError):
+                state.fail(error, text)
+
+        self.progress.start("the search", work, told, failed)
 
     def _failed(self, error: BaseException) -> None:
         """Show what a job raised: nothing is swallowed, and nothing ends the studio."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpjld.errors import InputError, WarpjldError
 from warpjld.script.scene import Actor, Scene
@@ -40,7 +41,10 @@ class StudioState:
         broken: Whether the script as it stands cannot be run.
         messages: What commands said last.
         coloring: What skin is coloured by.
+        joint: The joint that is selected, of the actor that sliders move.
         solved: The contact that was solved last.
+        preview: A scene that is shown in place of the script's, as long as the script stays as it is.
+        defer: Has a text that searches for grasps run beside, and then what shall follow; None where this one waits.
     """
 
     def __init__(
@@ -58,7 +62,10 @@ class StudioState:
         self.broken = False
         self.messages: deque[str] = deque(maxlen=_MESSAGES)
         self.coloring: Coloring = "skin"
+        self.joint: str | None = None
         self.solved: Pressed | None = None
+        self.preview: tuple[str, Scene] | None = None
+        self.defer: Callable[[str, Callable[[], object]], None] | None = None
         self.surfaces = Surfaces(device)
         self.performance = Performance(folder, say=self.messages.append, within=within)
         self._actor: str | None = None
@@ -100,6 +107,12 @@ class StudioState:
         found = [key for actor in scene.actors.values() for key in actor.key_frames]
         return sorted({*found, *(key for prop in scene.props.values() for key in prop.key_frames)})
 
+    def neighbours(self) -> dict[str, float]:
+        """The keys ``before`` and ``after`` the frame that is shown, where there are any."""
+        before = [key for key in self.keys if key < self.frame][-1:]
+        after = [key for key in self.keys if key > self.frame][:1]
+        return {which: keys[0] for which, keys in (("before", before), ("after", after)) if keys}
+
     def channels(self) -> dict[str, tuple[float, float]]:
         """Channels of the actor that may move, with their limits in degrees."""
         actor = self.actor
@@ -126,10 +139,19 @@ class StudioState:
 
     def shown(self) -> list[Shown]:
         """The surfaces at the frame that is shown; as contact has them, as long as it is that of this script."""
+        if self.preview is not None and self.preview[0] == self.document.text:
+            return self.surfaces.at(self.preview[1], self.frame, self.coloring)
         solved = self.pressed
         if solved is None:
             return self.surfaces.at(self.scene, self.frame, self.coloring)
-        return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.simulation.surfaces)
+        return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.surfaces)
+
+    def contacts(self) -> NDArray[np.float32]:
+        """Points where something presses at the frame that is shown [m], shape (n, 3); none where none is solved."""
+        solved = self.pressed
+        if solved is None:
+            return np.zeros((0, 3), np.float32)
+        return self.surfaces.contacts(solved.scene, self.frame, solved.surfaces)
 
     @property
     def pressed(self) -> Pressed | None:
@@ -160,12 +182,17 @@ class StudioState:
         return self.put(f"{body}\n{lines}\n" if body else f"{lines}\n", kind)
 
     def put(self, text: str, kind: Hashable = None) -> bool:
-        """Make this the script if it can be run; False where it cannot, and then it is as it was."""
+        """Make this the script if it can be run; False where it cannot, and then it is as it was. What searches for
+        grasps is deferred, and becomes the script when it is done, if nothing else was done meanwhile."""
         if self.broken:
             assert self.error is not None
             self.messages.append("nothing can be done by mouse before the script's fault is mended")
             return False
+        before = self.document.text
         try:
+            if self._deferred(text, lambda: self._put_later(before, text, kind)):
+                self.error = None
+                return True
             self.performance.run(text, self.document.path)
         except WarpjldError as error:
             self.performance.run(self.document.text, self.document.path)
@@ -202,14 +229,36 @@ class StudioState:
             self._run()
         return done
 
-    def open(self, document: ScriptDocument) -> None:
-        """Another script."""
+    def open(self, document: ScriptDocument, within: Sequence[Path] | None = None) -> None:
+        """Another script; files may be read from other folders than before where they are given."""
+        if within is not None:
+            self.performance = Performance(self.folder, say=self.messages.append, within=within)
         self.document = document
         self.frame, self._actor = 0.0, None
         self._run()
 
+    def fail(self, error: WarpjldError, text: str) -> None:
+        """What was deferred cannot be run: the script is broken if this is its text, and else as it was."""
+        self.error, self.broken = error, text == self.document.text
+
+    def _put_later(self, before: str, text: str, kind: Hashable) -> None:
+        if self.document.text == before:
+            self.put(text, kind)
+        else:
+            self.messages.append("a search ended, but the script was changed meanwhile: what it found is not used")
+
+    def _deferred(self, text: str, then: Callable[[], object]) -> bool:
+        """Whether this text is run beside first."""
+        if self.defer is None or not self.performance.searches(text, self.document.path):
+            return False
+        self.defer(text, then)
+        return True
+
     def _run(self) -> None:
         try:
+            if self._deferred(self.document.text, self._run):
+                self.error, self.broken = None, False
+                return
             self.performance.run(self.document.text, self.document.path)
         except WarpjldError as error:
             self.error, self.broken = error, True

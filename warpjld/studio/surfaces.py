@@ -23,6 +23,7 @@ Coloring = Literal["skin", "pressure", "domains", "stretch"]
 COLORINGS: tuple[Coloring, ...] = ("skin", "pressure", "domains", "stretch")
 """Quantities that skin can be coloured by."""
 
+_TOUCHED = 100.0  # pressure from which a point counts as touched [Pa]
 _STRETCH = ColorScale(0.6, 1.4, "length over rest", ("#2c5aa0", "#e9e4dc", "#b3261e"))
 
 
@@ -70,6 +71,15 @@ class Surfaces:
             shown.append(Shown(prop.name, vertices.astype(np.float32), prop.thing.faces, prop.color))
         return shown
 
+    def contacts(self, scene: Scene, frame: float, pressed: DeformedSurfaces) -> NDArray[np.float32]:
+        """Points of the skin, and of objects that deform, that something presses on [m], shape (n, 3)."""
+        crowd = replace(self._crowd(scene, frame), pressed=pressed)
+        points, values = self._pressures(PressureView(crowd, None), crowd)
+        return points[values > _TOUCHED].astype(np.float32)
+
+    def _pressures(self, view: PressureView, crowd: Crowd) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return view.at(0, np.concatenate([self._worn(crowd, role) for role in crowd.roles]))
+
     def _crowd(self, scene: Scene, frame: float) -> Crowd:
         for actor in scene.actors.values():
             self._rebind(actor)
@@ -101,7 +111,7 @@ class Surfaces:
 
     def _by_pressure(self, crowd: Crowd) -> list[Shown]:
         view = PressureView(crowd, None)
-        points, values = view.at(0, np.concatenate([self._worn(crowd, role) for role in crowd.roles]))
+        points, values = self._pressures(view, crowd)
         shown = [Shown("PRESSURE", points.astype(np.float32), view.faces, None, view.scale.colors(values))]
         for prop, vertices in zip(view.plain, view.others(0), strict=True):
             shown.append(Shown(prop.name, vertices.astype(np.float32), prop.thing.faces, prop.color))

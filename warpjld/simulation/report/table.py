@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["ContactRow", "ContactTable", "csv_cell", "digit_rows", "write_table"]
+__all__ = ["ContactRow", "ContactTable", "JointOpening", "csv_cell", "digit_rows", "write_table"]
 
 
 Slopes = Callable[[str, float, Mapping[str, float]], Mapping[str, DigitSlopes] | None]
@@ -69,6 +70,25 @@ class ContactRow:
     sliding: float
     state: str
     short_deg: float = 0.0
+
+
+@dataclass(frozen=True)
+class JointOpening:
+    """A joint that should be opened, so that muscles can bear a digit's force.
+
+    Attributes:
+        actor: Whose.
+        frame: Where it strains most.
+        joint: Its name; empty where no joint is known that would help.
+        degrees: How far to open it.
+        text: The same, and why.
+    """
+
+    actor: str
+    frame: float
+    joint: str
+    degrees: float
+    text: str
 
 
 class ContactTable:
@@ -126,14 +146,16 @@ class ContactTable:
                 )
         return out
 
-    def suggestions(self, model: ContactModel, slopes: Slopes = lambda actor, frame, forces: None) -> list[str]:
+    def suggestions(
+        self, model: ContactModel, slopes: Slopes = lambda actor, frame, forces: None
+    ) -> list[JointOpening]:
         """Suggestions which joints to open, at the frame of the largest load share of each actor.
 
         Args:
             model: The contact model with all edits.
             slopes: Derivatives of the digits' forces by their joints; None if not known.
         """
-        out = []
+        out: list[JointOpening] = []
         for hand in model.hands:
             efforts = self._efforts.get(hand.name, [])
             if not efforts or not hand.bones.bendable:
@@ -149,7 +171,10 @@ class ContactTable:
             )
             angles = hand.bones.animation.angles(frame)
             found = suggestions(hand.bones.skeleton, effort, angles, now, before if worst else None)
-            out += [f"{hand.name} at frame {frame:g}: {one.text}" for one in found]
+            for one in found:
+                joint = f"{one.digit}.{one.joint.replace(' ', '')}" if one.joint else ""
+                text = f"{hand.name} at frame {frame:g}: {one.text}"
+                out.append(JointOpening(hand.name, frame, joint, math.degrees(one.opening), text))
         return out
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpjld.fem import SolveStatus
 from warpjld.simulation.report.balance import ObjectBalance, balances
-from warpjld.simulation.report.table import ContactRow
+from warpjld.simulation.report.table import ContactRow, JointOpening
 from warpjld.simulation.report.visible_overlap import RemainingOverlap
 from warpjld.simulation.solve.digit_loads import CRUSHING
 
@@ -44,6 +44,7 @@ class ContactVerdict:
         corrections: Results of corrections.
         balance: Resultant force and moment on every object in contact at the last frame.
         stops: Digits that stopped at a limit, and how far they stay behind the animation.
+        openings: Those of the suggestions that name a joint.
     """
 
     status: str
@@ -55,6 +56,7 @@ class ContactVerdict:
     corrections: tuple[str, ...] = ()
     balance: tuple[str, ...] = ()
     stops: tuple[str, ...] = ()
+    openings: tuple[JointOpening, ...] = ()
 
     @property
     def failed(self) -> bool:
@@ -79,7 +81,7 @@ class ContactVerdict:
 def verdict_of(
     solved: SolveResult,
     rows: Sequence[ContactRow],
-    suggestions: Sequence[str],
+    suggestions: Sequence[JointOpening],
     overlaps: Sequence[RemainingOverlap] = (),
 ) -> ContactVerdict:
     """Verdict on solved frames.
@@ -148,7 +150,8 @@ def verdict_of(
     else:
         text = "nothing touches at any frame"
     balance, stops = tuple(one.text for one in last), _stops(solved, rows)
-    return ContactVerdict(status, text, tuple(lines), tuple(suggestions), frames, balance=balance, stops=stops)
+    said, openings = tuple(one.text for one in suggestions), tuple(one for one in suggestions if one.joint)
+    return ContactVerdict(status, text, tuple(lines), said, frames, balance=balance, stops=stops, openings=openings)
 
 
 def _lost(solved: SolveResult) -> str:

@@ -32,6 +32,11 @@ class DragPanel:
             self.wrist = gui.add_checkbox("Wrist follows, other tips pinned", False)
         self.what.on_update(lambda event: room.by_hand(event, lambda: None))
 
+    def take(self, digit: str | None) -> None:
+        """Put the handle on a digit's tip, if there is one."""
+        if digit in self.what.options:
+            self.what.value = digit
+
     def refresh(self) -> None:
         """Move the handle to the fingertip."""
         wanted = self._wanted()

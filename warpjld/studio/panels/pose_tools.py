@@ -5,11 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpjld.errors import InputError
 from warpjld.files.names import check_name
-from warpjld.script.pose_files import SHIPPED, hand_channels, save_pose
+from warpjld.script.pose_files import SHIPPED, hand_channels, load_pose, save_pose, shipped_pose
 from warpjld.studio.hand_pose import COARSE, coarse_angles, coarse_share, mixed, of_side, on_side
 from warpjld.studio.key_lines import number
+from warpjld.studio.pose_pictures import pose_sheet
 
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
@@ -33,11 +37,14 @@ class PoseToolsPanel:
             self.pose = gui.add_dropdown("Pose", SHIPPED, initial_value="relaxed")
             self.share = gui.add_slider("Percent", min=0, max=100, step=5, initial_value=100)
             self.apply = gui.add_button("Apply pose")
+            self.pictures = gui.add_button("Pictures of the poses")
+            self.sheet = gui.add_image(np.full((8, 8, 3), 255, np.uint8), visible=False)
             self.name = gui.add_text("Save as", "my-pose")
             self.save = gui.add_button("Save pose")
         self.copy = gui.add_button_group("Pose", ("copy", "paste", "paste flipped"))
         self.push = gui.add_button_group("Push", ("relax", "to last key", "to next key"))
         self.apply.on_click(lambda _: room.post(self._apply))
+        self.pictures.on_click(lambda _: room.post(self._picture))
         self.save.on_click(lambda _: room.post(self._save))
         self.copy.on_click(lambda event: self._copy(event.target.value))
         self.push.on_click(lambda event: self._push(event.target.value))
@@ -77,6 +84,17 @@ class PoseToolsPanel:
         which = name.upper() if name in SHIPPED else f'"{name}"'
         share = "" if self.share.value == 100 else f" SHARE {number(self.share.value)}"
         self._room.state.do(f"POSE {self.side.value.upper()} {which} {number(self._room.state.frame)}{share}")
+
+    def _picture(self) -> None:
+        """Pictures of all poses there are, as they are now."""
+        own = {name: load_pose(self._folder().parent / name) for name in self.pose.options if name not in SHIPPED}
+        poses = {name: shipped_pose(name) for name in SHIPPED} | {Path(name).stem: one for name, one in own.items()}
+
+        def show(sheet: NDArray[np.uint8]) -> None:
+            self.sheet.image = sheet
+            self.sheet.visible = True
+
+        self._room.progress.start("the pictures", lambda progress: pose_sheet(poses), show)
 
     def _save(self) -> None:
         state = self._room.state

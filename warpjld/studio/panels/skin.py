@@ -26,6 +26,11 @@ class SkinPanel:
             self.sliders = {name: self._slider(name, *_RANGES[name]) for name in _RANGES}
         self.joint.on_update(lambda event: room.by_hand(event, lambda: None))
 
+    def choose(self, joint: str) -> None:
+        """Show the parameters of a joint."""
+        if joint in self.joint.options:
+            self.joint.value = joint
+
     def refresh(self) -> None:
         """Update the values: those of the joint, or for all joints those of the first joint that flexes."""
         actor = self._room.state.actor

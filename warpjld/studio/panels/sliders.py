@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
 
-__all__ = ["SlidersPanel"]
+__all__ = ["SlidersPanel", "angle_slider", "show_angle"]
 
 _STEP = 0.5  # step of the sliders [degrees]
 
@@ -31,9 +31,7 @@ class SlidersPanel:
             self._make(channels)
             self._of = made
         for name, degrees in state.angles().items():
-            slider = self._sliders[name]
-            if abs(slider.value - degrees) > 0.5 * _STEP and not self._room.worker.waits(("angle", name)):
-                slider.value = degrees
+            show_angle(self._room, self._sliders[name], name, degrees)
 
     def _make(self, channels: dict[str, tuple[float, float]]) -> None:
         for folder in self._folders:
@@ -46,26 +44,32 @@ class SlidersPanel:
                 self._folders.append(folder)
                 with folder:
                     for name in names:
-                        self._sliders[name] = self._slider(name, *channels[name])
+                        self._sliders[name] = angle_slider(self._room, name, *channels[name])
 
-    def _slider(self, name: str, low: float, high: float) -> Any:
-        joint = name.split(".", maxsplit=2)[-1] if name.count(".") > 2 else name
-        hint = f"{name}, from {low:.4g}° to {high:.4g}°"
-        room = self._room
-        slider = room.server.gui.add_slider(
-            joint.removeprefix("left.").removeprefix("right.").replace(".", " "),
-            min=low,
-            max=high,
-            step=_STEP,
-            initial_value=min(max(0.0, low), high),
-            hint=hint,
-        )
 
-        def turn() -> None:
-            room.state.set_angles({name: slider.value}, kind=("angle", name, room.state.frame))
+def angle_slider(room: Room, name: str, low: float, high: float) -> Any:
+    """A slider for a channel between limits [degrees], at the place where it is made; it shows no value yet."""
+    joint = name.split(".", maxsplit=2)[-1] if name.count(".") > 2 else name
+    slider = room.server.gui.add_slider(
+        joint.removeprefix("left.").removeprefix("right.").replace(".", " "),
+        min=low,
+        max=high,
+        step=_STEP,
+        initial_value=min(max(0.0, low), high),
+        hint=f"{name}, from {low:.4g}° to {high:.4g}°",
+    )
 
-        slider.on_update(lambda event: room.by_hand(event, turn, key=("angle", name)))
-        return slider
+    def turn() -> None:
+        room.state.set_angles({name: slider.value}, kind=("angle", name, room.state.frame))
+
+    slider.on_update(lambda event: room.by_hand(event, turn, key=("angle", name)))
+    return slider
+
+
+def show_angle(room: Room, slider: Any, name: str, degrees: float) -> None:
+    """Set a channel's slider, unless it is being dragged."""
+    if abs(slider.value - degrees) > 0.5 * _STEP and not room.worker.waits(("angle", name)):
+        slider.value = degrees
 
 
 def _part(channel: str) -> str:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["StagePanel"]
 
+_CONTACT, _POINT = "#12b886", 8e-4
+"""Colour and size [m] of contact points."""
+
 
 class StagePanel:
     """Draws what is on stage, and how: shaded or as wires, with or without the skeleton."""
@@ -31,8 +34,15 @@ class StagePanel:
         self.style = gui.add_dropdown("Skin", ("shaded", "wire-frame", "x-ray"), initial_value="shaded")
         self.skeleton = gui.add_checkbox("Skeleton", False)
         self.objects = gui.add_checkbox("Objects", True)
-        for control in (self.style, self.skeleton, self.objects):
+        self.contacts = gui.add_checkbox("Contact points", False)
+        self._contacts: Any = None
+        for control in (self.style, self.skeleton, self.objects, self.contacts):
             control.on_update(lambda event: room.by_hand(event, lambda: None, key="style"))
+
+    @property
+    def drawn(self) -> list[Shown]:
+        """What is seen."""
+        return [*self._drawn.values()]
 
     def refresh(self) -> None:
         """Draw what changed."""
@@ -48,6 +58,7 @@ class StagePanel:
             for name, one in shown.items():
                 self._draw(name, one)
                 self._draw_skeleton(name, one)
+            self._draw_contacts()
         self._drawn = shown
         if shown and not self._looked_at:
             look(self._room.server, np.concatenate([one.vertices for one in shown.values()]))
@@ -73,8 +84,9 @@ class StagePanel:
         mesh = self._meshes[name]
         if not np.array_equal(one.vertices, self._drawn[name].vertices):
             mesh.vertices = one.vertices
-        mesh.wireframe = style == "wire-frame"
-        mesh.opacity = opacity
+        if (mesh.wireframe, mesh.opacity) != (style == "wire-frame", opacity):
+            self._remove(name)
+            self._draw(name, one)
 
     def _draw_colored(self, name: str, one: Shown) -> None:
         old = self._drawn.get(name)
@@ -102,6 +114,17 @@ class StagePanel:
             )
         elif not np.array_equal(points, self._bones[name].points):
             self._bones[name].points = points
+
+    def _draw_contacts(self) -> None:
+        points = self._room.state.contacts() if self.contacts.value else np.zeros((0, 3), np.float32)
+        if self._contacts is not None and not np.array_equal(self._contacts.points, points):
+            self._contacts.remove()
+            self._contacts = None
+        if self._contacts is None and len(points):
+            color = np.array(rgb(_CONTACT), np.uint8)
+            self._contacts = self._room.server.scene.add_point_cloud(
+                "/contacts", points, color, point_size=_POINT, point_shape="circle"
+            )
 
     def _remove(self, name: str) -> None:
         self._meshes.pop(name).remove()

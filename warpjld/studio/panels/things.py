@@ -8,6 +8,7 @@ import numpy as np
 
 from warpjld.script.props import Prop, prop_places
 from warpjld.studio.key_lines import number, with_values
+from warpjld.studio.panels.grasps import GraspsPanel
 
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
@@ -32,14 +33,13 @@ class ThingsPanel:
             self.shape = gui.add_dropdown("Shape", tuple(_SIZES), initial_value="ball")
             self.add = gui.add_button("Bring on")
             self.which = gui.add_dropdown("Object", (_NOTHING,), initial_value=_NOTHING)
-            self.length = gui.add_number("Frames to close in", 20, min=1, step=1)
-            self.grasp = gui.add_button_group("Grasp", ("close", "auto", "release"))
+            self.grasps = GraspsPanel(room)
         self.add.on_click(lambda _: room.post(self._add))
-        self.grasp.on_click(lambda event: self._grasp(event.target.value))
         self.which.on_update(lambda event: room.by_hand(event, lambda: None))
 
     def refresh(self) -> None:
         """Put the handle where the object is."""
+        self.grasps.refresh()
         scene = self._room.state.scene
         names = (_NOTHING, *scene.props)
         if tuple(self.which.options) != names:
@@ -85,17 +85,3 @@ class ThingsPanel:
         if state.do(f"OBJECT {shape}{count} {shape} {_SIZES[shape]}".upper().rstrip()):
             self.which.options = (_NOTHING, *state.scene.props)
             self.which.value = f"{shape}{count}".upper()
-
-    def _grasp(self, what: str) -> None:
-        state = self._room.state
-
-        def act() -> None:
-            first, last = number(state.frame), number(state.frame + self.length.value)
-            sides = {name.partition(".")[0] for name in state.channels()} & {"left", "right"}
-            side = sorted(sides)[0].upper() if sides else ""
-            if what == "release":
-                state.do(f"RELEASE {first} {last} {side}".rstrip())
-            else:
-                state.do(" ".join(["GRASP", first, last, side, self.which.value] + ["AUTO"] * (what == "auto")))
-
-        self._room.post(act)

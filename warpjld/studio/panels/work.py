@@ -1,16 +1,14 @@
-"""Panel for files and jobs: open, save, run the script, solve its contact; shows the results."""
+"""Panel of jobs: run the script, solve its contact, calibrate its skin; shows the results."""
 
 from __future__ import annotations
 
 from html import escape
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpjld.errors import InputError
-from warpjld.files.names import check_name
-from warpjld.studio.background import Background, JobProgress
-from warpjld.studio.document import ScriptDocument
-from warpjld.studio.making import made, pressed
+from warpjld.studio.background import JobProgress
+from warpjld.studio.fitting import fit_skin
+from warpjld.studio.making import Pressed, made, open_joints, pressed
 
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
@@ -19,52 +17,38 @@ __all__ = ["WorkPanel"]
 
 
 class WorkPanel:
-    """Opening and saving inside the script's folder, ``RUN``, ``PRESS``, progress, verdict and table."""
+    """``RUN``, ``PRESS``, calibration, verdict and table."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
-        self.work = Background(lambda: room.post(lambda: None, key="progress"))
+        self._seen: float | None = None
         gui = room.server.gui
-        self.name = gui.add_text("Script", room.state.document.path.name)
-        self.files = gui.add_button_group("File", ("save", "open", "new"))
-        self.scripts = gui.add_dropdown("In this folder", ("—",), initial_value="—")
         self.run = gui.add_button("RUN: make the files", hint="what warpjld run does with this script")
-        self.press = gui.add_button("PRESS: solve contact", hint="and see the pressure on the skin")
-        self.cancel = gui.add_button("Cancel", disabled=True)
-        self.bar = gui.add_progress_bar(0.0, visible=False)
-        self.step = gui.add_markdown("", visible=False)
+        self.press = gui.add_button("PRESS: solve contact", hint="and see the pressure on the skin, frame by frame")
+        self.fit = gui.add_button("Calibrate the skin", hint="what warpjld calibrate does with this actor")
         self.result = gui.add_html("")
-        self.files.on_click(lambda event: self._file(event.target.value))
-        self.scripts.on_update(lambda event: room.by_hand(event, self._choose))
+        self.open = gui.add_button("Open joints as suggested", visible=False)
         self.run.on_click(lambda _: room.post(self._run))
         self.press.on_click(lambda _: room.post(self._press))
-        self.cancel.on_click(lambda _: self.work.cancel())
+        self.fit.on_click(lambda _: room.post(self._fit))
+        self.open.on_click(lambda _: room.post(self._open))
 
     def refresh(self) -> None:
-        """Show what is being done, and what came of contact."""
-        running = self.work.running is not None
-        for control, disabled in ((self.run, running), (self.press, running), (self.cancel, not running)):
-            if control.disabled != disabled:
-                control.disabled = disabled
-        if self.bar.visible != running:
-            self.bar.visible = self.step.visible = running
-        if running:
-            self.bar.value = 100.0 * self.work.done
-            self.step.content = self.work.step
-        scripts = ("—", *sorted(path.name for path in self._folder.glob("*.jld")))
-        if tuple(self.scripts.options) != scripts:
-            self.scripts.options = scripts
+        """Show what came of contact."""
+        running = self._room.progress.work.running is not None
+        for control in (self.run, self.press, self.fit):
+            if control.disabled != running:
+                control.disabled = running
         content = self._contact()
         if content != self.result.content:
             self.result.content = content
-
-    @property
-    def _folder(self) -> Path:
-        return self._room.state.document.path.parent
+        suggested = bool(self._openings())
+        if self.open.visible != suggested:
+            self.open.visible = suggested
 
     def _contact(self) -> str:
         solved = self._room.state.pressed
-        if solved is None:
+        if solved is None or solved.simulation is None:
             return ""
         verdict = solved.simulation.verdict
         rows = "".join(
@@ -78,33 +62,12 @@ class WorkPanel:
             f"<table>{rows}</table><ul>{lines}</ul></div>"
         )
 
-    def _choose(self) -> None:
-        if self.scripts.value != "—":
-            self.name.value = self.scripts.value
+    def _openings(self) -> Any:
+        solved = self._room.state.pressed
+        return () if solved is None or solved.simulation is None else solved.simulation.verdict.openings
 
-    def _file(self, what: str) -> None:
-        state = self._room.state
-
-        def act() -> None:
-            path = self._path()
-            match what:
-                case "save":
-                    state.messages.append(f"saved {state.document.save(path).name}")
-                case "open":
-                    state.open(ScriptDocument.open(path))
-                case _:
-                    if path.exists():
-                        raise InputError(f"there is a file {path.name} already: give the new script another name")
-                    state.open(ScriptDocument(path, "HAND LEFT BUILTIN\n"))
-
-        self._room.post(act)
-
-    def _path(self) -> Path:
-        """The file in the script's folder that is named."""
-        name = check_name(self.name.value.strip(), "the script's name")
-        if Path(name).name != name:
-            raise InputError(f"'{name}': want a plain name; scripts stay in the folder {self._folder}")
-        return self._folder / (name if name.lower().endswith(".jld") else f"{name}.jld")
+    def _open(self) -> None:
+        open_joints(self._room.state, self._openings())
 
     def _run(self) -> None:
         state = self._room.state
@@ -117,28 +80,41 @@ class WorkPanel:
             names = ", ".join(str(one["name"]) for one in result["files"])
             state.messages.append(f"made in {scene.folder}: {names}")
 
-        self._start("RUN", work, told)
+        self._room.progress.start("RUN", work, told)
 
     def _press(self) -> None:
         state = self._room.state
         scene, text = state.copied_scene(), state.document.text
+        self._seen = None
 
-        def told(result: Any) -> None:
+        def show(so_far: Pressed) -> None:
+            state.solved, state.coloring = so_far, "pressure"
+            last = so_far.surfaces.frames[-1].frame
+            if self._seen in (None, state.frame):  # unless another frame is being looked at
+                state.frame = self._seen = last
+
+        def told(result: Pressed) -> None:
+            assert result.simulation is not None
             state.solved, state.coloring = result, "pressure"
             state.messages.append(result.simulation.verdict.text)
 
-        self._start("PRESS", lambda progress: pressed(text, scene, progress), told)
+        def work(progress: JobProgress) -> Pressed:
+            return pressed(
+                text, scene, progress, lambda so_far: self._room.post(lambda: show(so_far), key="solved frame")
+            )
 
-    def _start(self, what: str, work: Any, told: Any) -> None:
-        def ended(result: object, error: BaseException | None) -> None:
-            def show() -> None:
-                if error is not None:
-                    raise error
-                if result is None:
-                    self._room.state.messages.append(f"{what} was cancelled")
-                else:
-                    told(result)
+        self._room.progress.start("PRESS", work, told)
 
-            self._room.post(show)
+    def _fit(self) -> None:
+        state = self._room.state
+        scene, actor = state.copied_scene(), state.actor
+        if actor is None:
+            raise InputError("there is nobody whose skin could be fitted")
+        name, path = actor.name, state.document.path.with_name(f"{state.document.path.stem}-{actor.name.lower()}.json")
 
-        self.work.start(what, work, ended)
+        def told(losses: tuple[float, float]) -> None:
+            state.messages.append(f"the skin of {name} is fitted: loss {losses[0]:.3g} before, {losses[1]:.3g} after")
+            speak = "" if state.scene.current == name else f"ACTOR {name}\n"
+            state.do(f'{speak}PARAMETERS "{path.name}"')
+
+        self._room.progress.start("calibration", lambda progress: fit_skin(scene, name, path, progress), told)

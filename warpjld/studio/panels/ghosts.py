@@ -1,0 +1,49 @@
+"""Ghosts: the actors as they are at the keys before and after the frame that is shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.page.server import add_surface
+
+if TYPE_CHECKING:
+    from warpjld.studio.room import Room
+
+__all__ = ["GhostsPanel"]
+
+_COLORS = {"before": "#4c78a8", "after": "#e07b39"}
+_OPACITY = 0.18
+
+
+class GhostsPanel:
+    """Neighbouring keys, blue for the one before and orange for the one after."""
+
+    def __init__(self, room: Room) -> None:
+        self._room = room
+        self._meshes: dict[str, Any] = {}
+        self._drawn: dict[str, NDArray[np.float32]] = {}
+        self.on = room.server.gui.add_checkbox("Ghosts of neighbouring keys", False)
+        self.on.on_update(lambda event: room.by_hand(event, lambda: None, key="ghosts"))
+
+    def refresh(self) -> None:
+        """Draw them."""
+        state = self._room.state
+        wanted: dict[str, Any] = {}
+        for which, key in state.neighbours().items() if self.on.value else ():
+            for one in state.surfaces.at(state.scene, key):
+                if one.name in state.scene.actors:
+                    wanted[f"/ghosts/{which}/{one.name}"] = which, one
+        for name in [*self._meshes]:
+            if name not in wanted or len(self._drawn[name]) != len(wanted[name][1].vertices):
+                self._meshes.pop(name).remove()
+        for name, (which, one) in wanted.items():
+            if name not in self._meshes:
+                self._meshes[name] = add_surface(
+                    self._room.server, name, one.vertices, one.faces, _COLORS[which], opacity=_OPACITY
+                )
+            elif not np.array_equal(self._drawn[name], one.vertices):
+                self._meshes[name].vertices = one.vertices
+            self._drawn[name] = one.vertices

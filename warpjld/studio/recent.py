@@ -1,0 +1,40 @@
+"""Scripts that were open lately, kept in the user's cache folder."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from pathlib import Path
+
+from warpjld.files.kept_files import kept_folder
+from warpjld.files.whole_file import whole_file
+
+__all__ = ["note_recent", "recent_scripts"]
+
+_FILE = "studio-recent.json"
+_MOST = 8
+
+
+def recent_scripts() -> list[Path]:
+    """Those that are still there, the last first; none where the list cannot be read."""
+    folder = kept_folder()
+    if folder is None:
+        return []
+    try:
+        names = json.loads((folder / _FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    known = [Path(name) for name in names if isinstance(name, str)] if isinstance(names, list) else []
+    return [path for path in known if path.suffix.lower() == ".jld" and path.is_file()]
+
+
+def note_recent(path: Path) -> None:
+    """A script was opened or saved; a folder that cannot be written is no fault."""
+    folder = kept_folder()
+    if folder is None:
+        return
+    names = [str(path.resolve()), *(str(one) for one in recent_scripts() if one != path.resolve())]
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        with whole_file(folder / _FILE) as part:
+            part.write_text(json.dumps(names[:_MOST]), encoding="utf-8")
