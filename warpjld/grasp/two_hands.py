@@ -21,6 +21,8 @@ from warpjld.grasp.obstacles import Obstacles
 from warpjld.grasp.placements import Candidates, around, palms_on
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.widths import Widths, sample_widths
+from warpjld.skeleton import DIGITS, Skeleton
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["find_two_handed"]
 
@@ -29,6 +31,7 @@ _LINES = 400  # through the object, to find where it has opposite sides
 _ROUND = 24  # placements closed together
 _DEEPEST = 6e-4  # of hands and object in one another, above which a grasp is refused [m]
 _APART = 5e-3  # between the skins of the two hands at least [m]
+_BACK = np.radians(30.0)  # by which digits are bent back while the palm comes [rad]
 _COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # parts of the way at which a hand must not be in an obstacle
 
 
@@ -45,7 +48,7 @@ class _Side:
         """Palms at points (G, 3), looking and pointing along unit directions, brought to the object and closed."""
         covering = self.closer.covering
         skeleton = covering.skeleton
-        hands = palms_on(covering, skeleton.initial, self.closer.both.near, self.name, aim, look, fingers)
+        hands = palms_on(covering, bent_back(covering.skeleton, self.name), self.closer.both.near, self.name, aim, look, fingers)
         digits = [f"{self.name}.{digit}" for digit in self.judge.digits]
         closed = self.closer.close(hands.poses(skeleton), hands.angles, digits=digits, coupling=(1.0, 0.7))
         poses = hands.poses(skeleton, closed.angles)
@@ -57,6 +60,17 @@ class _Side:
             ways = [opened + (part * shifts).astype(np.float32) for part in _COMES]
             clear = np.all([self.around.missed(way) for way in (*ways, skins)], axis=0)
         return _Ended(hands, closed, skins, self.judge.pressing(poses, skins), clear)
+
+
+def bent_back(skeleton: Skeleton, side: str) -> NDArray[np.float64]:
+    """Angles of a hand whose digits are bent back, so that its palm is what meets an object first [rad], (J, 4)."""
+    angles = skeleton.initial.copy()
+    for digit in DIGITS:
+        name = f"{side}.{digit}.base"
+        if name in skeleton.names:
+            row = skeleton.index(name)
+            angles[row, FLEXION] = max(angles[row, FLEXION] - _BACK, skeleton.limits[row, FLEXION, 0])
+    return angles
 
 
 @dataclass(frozen=True, eq=False)

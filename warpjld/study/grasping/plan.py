@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +12,7 @@ from warpjld.files.toml_table import TomlTable, read_toml
 from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
+from warpjld.study.grasping.pressing import Pressing, read_pressing
 
 __all__ = ["COMPUTING", "GraspPlan", "Measuring", "WristRange", "load_plan"]
 
@@ -78,7 +80,8 @@ class Measuring:
 class GraspPlan:
     """All of a study but its number of trials decides what trial k is: studies can be made longer later.
 
-    Trial k takes combination k modulo hands × objects × scales × frictions, in this order, frictions fastest.
+    Trial k takes combination k modulo hands × objects × scales × frictions × weights of ``pressing``, in this order,
+    the last fastest.
     """
 
     title: str
@@ -93,10 +96,25 @@ class GraspPlan:
     coupling: tuple[float, float]
     wrist: WristRange
     measuring: Measuring
+    pressing: Pressing | None = None
+
+    @property
+    def combinations(self) -> int:
+        """How many there are."""
+        kinds = (self.hands, self.objects, self.scales, self.frictions, self._weights)
+        return math.prod(len(kind) for kind in kinds)
+
+    @property
+    def _weights(self) -> tuple[float | None, ...]:
+        return (None,) if self.pressing is None else self.pressing.weights
+
+    def weight(self, trial: int) -> float | None:
+        """What hangs on the object in a trial [N]; None where contact is not solved."""
+        return self._weights[trial % len(self._weights)]
 
     def combination(self, trial: int) -> tuple[HandChoice, ObjectChoice, float, float]:
         """Hand, object, scale and friction of a trial."""
-        rest, friction = divmod(trial, len(self.frictions))
+        rest, friction = divmod(trial // len(self._weights), len(self.frictions))
         rest, scale = divmod(rest, len(self.scales))
         rest, thing = divmod(rest, len(self.objects))
         return self.hands[rest % len(self.hands)], self.objects[thing], self.scales[scale], self.frictions[friction]
@@ -105,6 +123,8 @@ class GraspPlan:
         """All that decides the results, as JSON; hashes stand for files."""
         settings = asdict(self)
         del settings["trials"], settings["title"]
+        if self.pressing is None:
+            del settings["pressing"]
         settings["hands"] = [hand.identity() for hand in self.hands]
         settings["objects"] = [thing.identity() for thing in self.objects]
         return settings | {"versions": {name: versions([name])[name] for name in COMPUTING}}
@@ -131,6 +151,7 @@ def load_plan(path: str | Path) -> GraspPlan:
         coupling=_read_coupling(top),
         wrist=_read_wrist(top.table("wrist")),
         measuring=_read_measuring(top.table("measuring")),
+        pressing=read_pressing(top.table("contact")) if "contact" in top else None,
     )
     top.finish()
     if plan.wrist.best_of and (len(plan.digits) < len(DIGITS) or not isinstance(plan.posture, str)):
