@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,11 @@ from warpjld.grasp.draws import WAY, preference
 from warpjld.grasp.judge import Judge, Pressing, Verdict, check_friction
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
+from warpjld.grasp.palm import palm_of
 from warpjld.grasp.placements import Candidates, around, palms_on
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.widths import Widths, sample_widths
-from warpjld.skeleton import DIGITS, Skeleton
+from warpjld.skeleton import CHANNELS, DIGITS, Skeleton, poses_from_angles
 from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["find_two_handed"]
@@ -31,7 +33,7 @@ _LINES = 400  # through the object, to find where it has opposite sides
 _ROUND = 24  # placements closed together
 _DEEPEST = 6e-4  # of hands and object in one another, above which a grasp is refused [m]
 _APART = 5e-3  # between the skins of the two hands at least [m]
-_BACK = np.radians(30.0)  # by which digits are bent back while the palm comes [rad]
+_BACK = np.radians(30.0)  # by which fingers are bent back while the palm comes [rad]
 _COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # parts of the way at which a hand must not be in an obstacle
 
 
@@ -63,14 +65,24 @@ class _Side:
 
 
 def bent_back(skeleton: Skeleton, side: str) -> NDArray[np.float64]:
-    """Angles of a hand whose digits are bent back, so that its palm is what meets an object first [rad], (J, 4)."""
+    """Angles of a hand whose digits are bent back, so that its palm is what meets an object first [rad], (J, 4).
+
+    Fingers bend back at their base by 30°; the thumb is turned to where its joints lie least before the palm, of the
+    ends of its base joint's ranges."""
     angles = skeleton.initial.copy()
-    for digit in DIGITS:
-        name = f"{side}.{digit}.base"
-        if name in skeleton.names:
-            row = skeleton.index(name)
-            angles[row, FLEXION] = max(angles[row, FLEXION] - _BACK, skeleton.limits[row, FLEXION, 0])
-    return angles
+    there = {digit: f"{side}.{digit}.base" for digit in DIGITS if f"{side}.{digit}.base" in skeleton.names}
+    for name in (name for digit, name in there.items() if digit != "thumb"):
+        row = skeleton.index(name)
+        angles[row, FLEXION] = max(angles[row, FLEXION] - _BACK, skeleton.limits[row, FLEXION, 0])
+    if "thumb" not in there:
+        return angles
+    row = skeleton.index(there["thumb"])
+    ends = np.column_stack([skeleton.limits[row], angles[row]])
+    tried = np.repeat(angles[None], 3 ** len(CHANNELS), axis=0)
+    tried[:, row] = list(product(*ends))
+    chain = [skeleton.index(name) for name in skeleton.names if name.startswith(f"{side}.thumb.")]
+    ahead = poses_from_angles(skeleton, tried).positions[:, chain] @ palm_of(skeleton, side).normal
+    return np.asarray(tried[ahead.max(axis=1).argmin()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +106,9 @@ def find_two_handed(
     """Place two open hands on opposite sides of an object, close them, judge both together, keep the best.
 
     The palms look at one another along a line that friction holds between its two ends; the fingers of both point the
-    same way. A grasp counts if the contacts of both together are force closed, both hands press, and neither is more
-    than 0.6 mm in the object or nearer than 5 mm to the other.
+    same way. Digits are bent back until a palm is on the object, and then close. A grasp counts if the contacts of both
+    together are force closed, both hands press, and neither is more than 0.6 mm in the object or nearer than 5 mm to the
+    other. One that both palms press is better than any that fingers alone hold.
 
     Args:
         hands: The hands by side, ``left`` and ``right``, smooth method.
@@ -106,7 +119,8 @@ def find_two_handed(
         seed: Of the sampling.
 
     Returns:
-        The grasp of each side; both have the verdict of the two together.
+        The grasp of each side; both have the verdict of the two together. Their posture is ``palms`` where both palms
+        press, else ``fingers``.
 
     Raises:
         InputError: A side is missing, the object has no opposite sides, or no placement ends in a grasp.
@@ -133,7 +147,7 @@ def find_two_handed(
         ended = _placed(sides, widths, near.thing, some, rng)
         for g in range(some):
             verdict = _together(sides, ended, g, friction)
-            if verdict is not None and verdict.score > (best["left"].score if best else 0.0):
+            if verdict is not None and _rank(verdict) > (_rank(best["left"].verdict) if best else (False, 0.0)):
                 best = {side.name: _grasp(side, one, g, verdict, tried) for side, one in zip(sides, ended, strict=True)}
     if not best:
         widest = 1e3 * float(widths.width.max())
@@ -182,11 +196,17 @@ def _together(sides: list[_Side], ended: list[_Ended], g: int, friction: float) 
         np.concatenate([one.spin for one in several]),
     )
     digits = tuple(f"{side.name}.{name}" for side, one in zip(sides, pressing, strict=True) for name in one.digits)
-    return sides[0].judge.verdict(contacts, digits, any(one.palm for one in pressing), depth)
+    return sides[0].judge.verdict(contacts, digits, all(one.palm for one in pressing), depth)
+
+
+def _rank(verdict: Verdict) -> tuple[bool, float]:
+    """What closes: both palms before fingers alone, then the better score."""
+    return verdict.closed and verdict.palm, verdict.score
 
 
 def _grasp(side: _Side, ended: _Ended, g: int, verdict: Verdict, tried: int) -> AutoGrasp:
     hands = ended.hands
     touching = tuple(name for name in verdict.digits if name.startswith(f"{side.name}."))
     place = hands.position[g], hands.rotation[g], hands.approach[g], hands.angles[g]
-    return AutoGrasp("palms", *place, ended.closed.angles[g], verdict, touching, tried)
+    posture = "palms" if verdict.palm else "fingers"
+    return AutoGrasp(posture, *place, ended.closed.angles[g], verdict, touching, tried)
