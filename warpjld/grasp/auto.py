@@ -94,6 +94,7 @@ def find_grasp(
     posture: str | None = None,
     coupling: tuple[float, float] | None = (1.0, 0.7),
     friction: float = 0.6,
+    palm: bool = False,
     seed: int = 0,
 ) -> AutoGrasp:
     """Place open hands about the object, close them, judge them, keep the best.
@@ -122,6 +123,7 @@ def find_grasp(
         posture: The only one of ``POSTURES`` that is tried; by the object's shape if left out.
         coupling: See :meth:`~warpjld.grasp.close.Closer.close`.
         friction: Coulomb coefficient.
+        palm: Whether the palm is to press too: power grips only.
         seed: Of the sampling.
 
     Raises:
@@ -158,10 +160,12 @@ def find_grasp(
             least = best.score if best else 0.0
             if verdict.score <= least:
                 break
+            if palm and not verdict.palm:
+                continue
             # whether digits cross is looked at last: it costs
             there = closer.parted(hand.poses(covering.skeleton), hand.angles, closed)
             (verdict,) = _verdicts(judge, covering, hand, there)
-            if verdict.depth > _DEEPEST or verdict.score <= least:
+            if verdict.depth > _DEEPEST or verdict.score <= least or (palm and not verdict.palm):
                 continue
             if around and _runs_into(covering, hand, there.angles, around):
                 continue

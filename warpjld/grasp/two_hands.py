@@ -50,7 +50,9 @@ class _Side:
         """Palms at points (G, 3), looking and pointing along unit directions, brought to the object and closed."""
         covering = self.closer.covering
         skeleton = covering.skeleton
-        hands = palms_on(covering, bent_back(covering.skeleton, self.name), self.closer.both.near, self.name, aim, look, fingers)
+        hands = palms_on(
+            covering, bent_back(covering.skeleton, self.name), self.closer.both.near, self.name, aim, look, fingers
+        )
         digits = [f"{self.name}.{digit}" for digit in self.judge.digits]
         closed = self.closer.close(hands.poses(skeleton), hands.angles, digits=digits, coupling=(1.0, 0.7))
         poses = hands.poses(skeleton, closed.angles)

@@ -32,6 +32,7 @@ class WristRange:
         offset: How far beside the object's centre the palm aims, as a share of the object's half extent.
         best_of: 0 draws one placement from these ranges; n takes the best of n as `warpjld.grasp.auto.find_grasp` (the
             script's GRASP … AUTO) finds it, and the ranges say nothing.
+        palm: With ``best_of``: whether only grasps count that the palm presses too, power grips.
     """
 
     elevation: tuple[float, float] = (-90.0, 90.0)
@@ -41,6 +42,7 @@ class WristRange:
     gap: tuple[float, float] = (0.0, 0.02)
     offset: tuple[float, float] = (0.0, 0.3)
     best_of: int = 0
+    palm: bool = False
 
 
 Posture = str | tuple[tuple[str, str, float], ...]
@@ -125,6 +127,8 @@ class GraspPlan:
         del settings["trials"], settings["title"]
         if self.pressing is None:
             del settings["pressing"]
+        if not self.wrist.palm:  # as in studies that were begun before there was such a choice
+            del settings["wrist"]["palm"]
         settings["hands"] = [hand.identity() for hand in self.hands]
         settings["objects"] = [thing.identity() for thing in self.objects]
         return settings | {"versions": {name: versions([name])[name] for name in COMPUTING}}
@@ -199,7 +203,10 @@ def _read_wrist(table: TomlTable) -> WristRange:
         gap=_range(table, "gap", default.gap, 0.0, 1.0),
         offset=_range(table, "offset", default.offset, 0.0, 1.0),
         best_of=table.integer("best_of", default.best_of),
+        palm=table.truth("palm", default.palm),
     )
+    if found.palm and not found.best_of:
+        table.fail("palm", "is for best_of: ranges alone choose no grasp")
     table.finish()
     return found
 

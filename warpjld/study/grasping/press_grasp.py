@@ -76,15 +76,20 @@ def press_grasp(
     try:
         found = simulate(_specification(hand, asked, friction, how), animation)
     except WarpjldError as error:
-        return {"press": ForceStatus.NO_SOLUTION.name, "asked_force": asked}, None, str(error)
-    values = {"press": _ending(found), "asked_force": asked}
+        return {"press": ForceStatus.NO_SOLUTION.name, "asked_force": asked, "success": False}, None, str(error)
+    values: dict[str, Any] = {"press": _ending(found), "asked_force": asked, "success": False}
     if not found.grips or not len(found.frames) or found.frames[-1] <= _CLOSED:
         return values, None, found.verdict.text
     last = float(found.frames[-1])
     rows = [row for row in found.rows if row.frame == last and row.actor == _HAND]
     seen = found.visible_pressure(_HAND, last).pressure[: hand.rig.surface.vertices.shape[0]]
-    message = "" if values["press"] == ForceStatus.REACHED.name else found.grips[0].text
-    return {**values, **_measured(found, rows)}, np.asarray(seen), message
+    values |= _measured(found, rows)
+    reached = values["press"] == ForceStatus.REACHED.name
+    values["success"] = reached and how.kept(values["force"], asked=asked)
+    message = found.grips[0].text if not values["success"] else ""
+    if reached and message:
+        message += f"; at the last frame they press with {values['force']:.3g} N"
+    return values, np.asarray(seen), message
 
 
 def _specification(hand: Hand, asked: float, friction: float, how: Pressing) -> ContactSpecification:

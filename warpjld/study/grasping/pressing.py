@@ -8,6 +8,8 @@ from warpjld.files.toml_table import TomlTable
 
 __all__ = ["Pressing", "read_pressing"]
 
+_TOLERANCE = 0.1
+
 
 @dataclass(frozen=True)
 class Pressing:
@@ -29,6 +31,10 @@ class Pressing:
         """Sum of the digits' forces [N] that is asked for: margin · W / μ, since normal forces N in all hold μ N of a
         weight W along the surface."""
         return self.margin * weight / friction
+
+    def kept(self, force: float, *, asked: float) -> bool:
+        """Whether a force at the end is the one asked for [N], within 10 %."""
+        return abs(force - asked) <= _TOLERANCE * asked
 
 
 def read_pressing(table: TomlTable) -> Pressing:

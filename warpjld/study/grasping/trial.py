@@ -209,8 +209,7 @@ class GraspExperiment:
         from warpjld.study.grasping.press_grasp import press_grasp
 
         placed = (tried.start, tried.angles, tried.position, tried.rotation)
-        values, pressure, message = press_grasp(hand, thing, *placed, friction=friction, weight=weight, how=how)
-        return values | {"success": values["press"] == "REACHED"}, pressure, message
+        return press_grasp(hand, thing, *placed, friction=friction, weight=weight, how=how)
 
     def alike(self, trial: int) -> tuple[HandChoice, ObjectChoice, float]:
         """Hand, object and scale: hands on one object close together."""
@@ -296,6 +295,7 @@ class GraspExperiment:
                 posture=None if posture == "auto" else posture,
                 coupling=self.settings.coupling if any(self.settings.coupling) else None,
                 friction=friction,
+                palm=self.settings.wrist.palm,
                 seed=seed,
             )
         except InputError as error:
