@@ -14,12 +14,12 @@ from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, Closer
 from warpjld.grasp.draws import Draws
-from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.judge import Judge, Verdict, check_friction, hand_side
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
 from warpjld.grasp.placements import Candidates
 from warpjld.grasp.postures import posture_for
+from warpjld.grasp.refusal import fault_of, refuse_what_is_too_wide
 from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["AutoGrasp", "find_grasp"]
@@ -29,7 +29,6 @@ _FINALISTS = 6  # of a round, closed and judged in full
 _DEEPEST = 6e-4  # of hand and object in one another, above which a grasp is refused [m]
 _PRESSED = 3e-4  # depth from which an open hand goes back [m]
 _GOOD = 0.12  # score that ends the search early [N]
-_SLACK = 1.2  # times what thumb and fingers span: what is wider everywhere is not tried
 _OTHERS = ("plate", "cylinder", "sphere", "pinch")  # postures in turn while nothing is found
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # parts of the digits' way at which the hand must not be in an obstacle
 
@@ -123,7 +122,7 @@ def find_grasp(
         posture: The only one of ``POSTURES`` that is tried; by the object's shape if left out.
         coupling: See :meth:`~warpjld.grasp.close.Closer.close`.
         friction: Coulomb coefficient.
-        palm: Whether the palm is to press too: power grips only.
+        palm: Whether only power grips count: the palm presses too, and all digits but one.
         seed: Of the sampling.
 
     Raises:
@@ -146,7 +145,7 @@ def find_grasp(
     around, rng = Obstacles(covering, obstacles), np.random.default_rng(seed)
     judge = Judge(closer.both, side, friction)
     draws = {kind: Draws(covering, closer.both.near, around, side, kind, rng) for kind in dict.fromkeys(kinds)}
-    _refuse_what_is_too_wide(draws[first], friction)
+    refuse_what_is_too_wide(draws[first], friction)
     best: AutoGrasp | None = None
     tried = 0
     for number in range(-(-count // _ROUND)):
@@ -160,12 +159,12 @@ def find_grasp(
             least = best.score if best else 0.0
             if verdict.score <= least:
                 break
-            if palm and not verdict.palm:
+            if palm and not _power(verdict, digits):
                 continue
             # whether digits cross is looked at last: it costs
             there = closer.parted(hand.poses(covering.skeleton), hand.angles, closed)
             (verdict,) = _verdicts(judge, covering, hand, there)
-            if verdict.depth > _DEEPEST or verdict.score <= least or (palm and not verdict.palm):
+            if verdict.depth > _DEEPEST or verdict.score <= least or (palm and not _power(verdict, digits)):
                 continue
             if around and _runs_into(covering, hand, there.angles, around):
                 continue
@@ -187,27 +186,18 @@ def find_grasp(
     if best is None:
         turned_down = sum(one.turned_down for one in draws.values())
         blocked = f", or out of reach: {', '.join(around.names)} blocked {turned_down} more" if around else ""
+        with_palm = ", palm and digits on it" if palm else ""
         taken = ", ".join(dict.fromkeys(kinds[: -(-count // _ROUND)]))
         raise InputError(
             f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
-            f"(postures {taken}): it may be too small, too smooth or too heavy to one side{blocked}"
+            f"(postures {taken}){with_palm}: {fault_of(draws[first], friction)}{blocked}"
         )
     return replace(best, tried=tried)
 
 
-def _refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
-    """InputError where nothing of the object fits between thumb and fingers, with its width and theirs."""
-    thing, widest = draws.near.thing, draws.widest
-    if thing.size.min() <= _SLACK * widest:  # it costs to look closer, and next to none of these are
-        return
-    narrowest = draws.narrowest(friction)
-    if narrowest > _SLACK * widest:
-        doubt = doubt_of_size(thing, hand_length(draws.covering.skeleton), None)
-        also = f"; it {doubt}" if doubt else "; two hands may take it (GRASP … BOTH … AUTO)"
-        raise InputError(
-            f"object {thing.name}: too wide for this hand: nowhere narrower than {1e3 * narrowest:.0f} mm, and thumb "
-            f"and fingers open to {1e3 * widest:.0f} mm{also}"
-        )
+def _power(verdict: Verdict, digits: Sequence[str]) -> bool:
+    """Whether it is a power grip of these digits."""
+    return verdict.palm and len(verdict.digits) >= len(digits) - 1
 
 
 def _best_first(

@@ -70,8 +70,18 @@ class Draws:
     @cached_property
     def widest(self) -> float:
         """How far thumb and fingers open in any posture [m]."""
+        return max(float(one.width[0]) for one in self._in_air)
+
+    @cached_property
+    def least(self) -> float:
+        """Least distance of thumb and fingers when they close, in any posture [m]."""
+        return min(float(one.width.min()) for one in self._in_air)
+
+    @cached_property
+    def _in_air(self) -> list[Opening]:
+        """All postures, closing on nothing."""
         starts = np.array([posture_angles(self.covering.skeleton, self.side, posture) for posture in POSTURES])
-        return max(float(one.width[0]) for one in closing_in_air(self.covering, self.side, starts, self.closing))
+        return closing_in_air(self.covering, self.side, starts, self.closing)
 
     def narrowest(self, friction: float) -> float:
         """Least of some widths of the object that friction holds between two contacts [m]; its size without any."""

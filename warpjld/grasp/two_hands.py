@@ -109,8 +109,8 @@ def find_two_handed(
 
     The palms look at one another along a line that friction holds between its two ends; the fingers of both point the
     same way. Digits are bent back until a palm is on the object, and then close. A grasp counts if the contacts of both
-    together are force closed, both hands press, and neither is more than 0.6 mm in the object or nearer than 5 mm to the
-    other. One that both palms press is better than any that fingers alone hold.
+    together are force closed, both hands press, and neither is more than 0.6 mm in the object or nearer than 5 mm to
+    the other. One that both palms press is better than any that fingers alone hold.
 
     Args:
         hands: The hands by side, ``left`` and ``right``, smooth method.

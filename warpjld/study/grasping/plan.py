@@ -32,7 +32,7 @@ class WristRange:
         offset: How far beside the object's centre the palm aims, as a share of the object's half extent.
         best_of: 0 draws one placement from these ranges; n takes the best of n as `warpjld.grasp.auto.find_grasp` (the
             script's GRASP … AUTO) finds it, and the ranges say nothing.
-        palm: With ``best_of``: whether only grasps count that the palm presses too, power grips.
+        palm: With ``best_of``: whether only power grips count, of the palm and all digits but one.
     """
 
     elevation: tuple[float, float] = (-90.0, 90.0)
