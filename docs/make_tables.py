@@ -44,9 +44,10 @@ def tables() -> dict[str, str]:
     """Tables of columns, by the name of their marks in a page."""
     from warpjld.simulation.report.tactile_files import TACTILE_COLUMNS
     from warpjld.study.columns import COMMON_COLUMNS
-    from warpjld.study.grasping.columns import GRASP_COLUMNS
+    from warpjld.study.grasping.columns import GRASP_COLUMNS, PRESSED_COLUMNS
 
-    return {"tactile": _table(TACTILE_COLUMNS), "study": _table((*COMMON_COLUMNS, *GRASP_COLUMNS))}
+    studies = {"study": _table((*COMMON_COLUMNS, *GRASP_COLUMNS)), "pressed": _table(PRESSED_COLUMNS)}
+    return {"tactile": _table(TACTILE_COLUMNS), **studies}
 
 
 def _table(columns: tuple) -> str:

@@ -1,8 +1,11 @@
 """Grasps found without help: postures by shape, wrist placements, the best hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from warpjld.covering import bind
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.approach_directions import free_ways
@@ -19,6 +22,7 @@ from warpjld.grasp.random_placements import WAY
 from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
 from warpjld.grasp.widths import sample_widths
 from warpjld.skeleton import poses_from_angles
+from warpjld.skeleton.channels import FLEXION
 
 
 def test_a_plate_is_not_held_as_a_glass() -> None:
@@ -127,8 +131,35 @@ def test_what_no_hand_can_span_is_told_with_both_widths(covering) -> None:
 
 
 def test_what_does_not_hold_is_told(covering) -> None:
-    with pytest.raises(InputError, match="none of 6 placements ends in a grasp that holds at friction"):
+    says = r"none of 6 placements ends in a grasp .* neither hand, object nor unit .* is \d+ mm wide .* to 1?\d\d mm"
+    with pytest.raises(InputError, match=says):
         find_grasp(covering, ball(0.06, subdivisions=2), count=6, friction=0.01)
+
+
+@pytest.mark.parametrize(
+    ("thing", "friction", "says"),
+    [
+        (
+            ball(0.008, subdivisions=2),
+            0.6,
+            r"the object is at fault: .* fingertip, 8.0 mm .* open from \d+ to 1?\d\d mm",
+        ),
+        (ball(0.003, subdivisions=2), 0.6, r"the unit is at fault, it seems: the object measures 0.003 m"),
+    ],
+)
+def test_what_is_at_fault_is_told(covering, thing, friction: float, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        find_grasp(covering, thing, count=2, friction=friction)
+
+
+def test_a_hand_that_cannot_close_is_at_fault(covering) -> None:
+    """Joints locked open: no pad comes near another."""
+    skeleton = covering.skeleton
+    limits = skeleton.limits.copy()
+    limits[:, FLEXION] = 0.0
+    stiff = bind(replace(skeleton, limits=limits), covering.surface)
+    with pytest.raises(InputError, match=r"the hand is at fault: its thumb and fingers do not close far enough"):
+        find_grasp(stiff, ball(0.03, subdivisions=2), count=2)
 
 
 def bowl(radius: float, wall: float):

@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import cKDTree
 
 from warpjld.covering import bind
 from warpjld.errors import InputError
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.quality import Contacts, least_resistance
-from warpjld.grasp.shapes import ball, box
+from warpjld.grasp.segments import SEGMENTS, vertex_segments
+from warpjld.grasp.shapes import ball, box, cylinder
 from warpjld.grasp.two_hands import find_two_handed
 
 
@@ -30,6 +32,20 @@ def test_palms_are_opposed_across_a_crate(both) -> None:
     for side, skin in skins.items():
         assert HandObjectGaps(both[side], thing).depths(skin[None]).max() < 6e-4
     assert cKDTree(skins["left"]).query(skins["right"])[0].min() > 0.2  # the crate is between them
+
+
+@pytest.mark.parametrize("thing", [box(0.2, 0.2, 0.2), cylinder(0.3, 0.3)], ids=lambda one: one.name)
+def test_palms_press(both, thing) -> None:
+    """By the skin itself, not by the verdict: a vertex of each palm within a millimetre of the object."""
+    found = find_two_handed(both, thing, count=24)
+    assert {one.posture for one in found.values()} == {"palms"}
+    solid = trimesh.Trimesh(thing.vertices, thing.faces, process=False)
+    for side, grasp in found.items():
+        skin = both[side].deform(grasp.poses(both[side].skeleton))[0]
+        palm = skin[vertex_segments(both[side], side) == SEGMENTS.index("palm")]
+        _, away, _ = trimesh.proximity.closest_point(solid, palm)
+        assert away.min() < 1e-3
+        assert grasp.verdict.closed
 
 
 def test_contacts_of_both_hands_count_together() -> None:

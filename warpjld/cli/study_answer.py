@@ -19,7 +19,7 @@ __all__ = ["tell", "tell_checked", "tell_rerun"]
 
 def tell_checked(path: Path, plan: GraspPlan, notes: list[str], as_json: bool, quiet: bool) -> None:
     """Print the size of a plan."""
-    combinations = len(plan.hands) * len(plan.objects) * len(plan.scales) * len(plan.frictions)
+    combinations = plan.combinations
     tried = min(combinations, plan.trials)
     if as_json:
         counts = {"trials": plan.trials, "combinations": combinations, "combinations_tried": tried}
@@ -27,7 +27,10 @@ def tell_checked(path: Path, plan: GraspPlan, notes: list[str], as_json: bool, q
     elif not quiet:
         for note in notes:
             click.echo(f"note: {note}")
-        of = f"{tried} of {combinations} combinations of hand, object, scale and friction"
+        factors = (
+            "hand, object, scale and friction" if plan.pressing is None else "hand, object, scale, friction and weight"
+        )
+        of = f"{tried} of {combinations} combinations of {factors}"
         click.echo(f"{path}: {plan.trials} trials of {of}")
 
 

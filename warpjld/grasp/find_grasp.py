@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, Closer
-from warpjld.grasp.hand_scale import doubt_of_size, hand_length
 from warpjld.grasp.judge import Judge, Verdict, check_friction, hand_side
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
 from warpjld.grasp.placements import Candidates
 from warpjld.grasp.postures import posture_for
 from warpjld.grasp.random_placements import Draws
+from warpjld.grasp.refusal import fault_of, refuse_what_is_too_wide
 from warpjld.skeleton import Poses, Skeleton
 
 __all__ = ["AutoGrasp", "find_grasp"]
@@ -28,7 +28,6 @@ _FINALISTS = 6  # placements of a round that are closed and judged in full
 _DEEPEST = 6e-4  # largest penetration of hand and object in a grasp that is accepted [m]
 _PRESSED = 3e-4  # penetration above which an open hand is moved back along its approach [m]
 _GOOD = 0.12  # score at which the search may end early [N]
-_SLACK = 1.2  # an object is refused if it is nowhere narrower than this factor times the hand's opening
 _OTHERS = ("plate", "cylinder", "sphere", "pinch")  # further postures, tried in turn while nothing is found
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # fractions of the closing motion at which collisions are tested
 
@@ -93,6 +92,7 @@ def find_grasp(
     posture: str | None = None,
     coupling: tuple[float, float] | None = (1.0, 0.7),
     friction: float = 0.6,
+    palm: bool = False,
     seed: int = 0,
 ) -> AutoGrasp:
     """Find a grasp: sample placements of an open hand around the object, close each, judge it, keep the best.
@@ -122,6 +122,7 @@ def find_grasp(
         posture: The only one of ``POSTURES`` that is tried; chosen by the object's shape if left out.
         coupling: See :meth:`~warpjld.grasp.close.Closer.close`.
         friction: Coulomb coefficient.
+        palm: Accept power grips only: the palm and all digits but one are in contact.
         seed: Seed of the random numbers.
 
     Raises:
@@ -144,7 +145,7 @@ def find_grasp(
     around, rng = Obstacles(covering, obstacles), np.random.default_rng(seed)
     judge = Judge(closer.both, side, friction)
     draws = {kind: Draws(covering, closer.both.near, around, side, kind, rng) for kind in dict.fromkeys(kinds)}
-    _refuse_what_is_too_wide(draws[first], friction)
+    refuse_what_is_too_wide(draws[first], friction)
     best: AutoGrasp | None = None
     tried = 0
     for number in range(-(-count // _ROUND)):
@@ -158,10 +159,12 @@ def find_grasp(
             least = best.score if best else 0.0
             if verdict.score <= least:
                 break
+            if palm and not _power(verdict, digits):
+                continue
             # digits that cross one another are separated last, because this is expensive
             there = closer.parted(hand.poses(covering.skeleton), hand.angles, closed)
             (verdict,) = _verdicts(judge, covering, hand, there)
-            if verdict.depth > _DEEPEST or verdict.score <= least:
+            if verdict.depth > _DEEPEST or verdict.score <= least or (palm and not _power(verdict, digits)):
                 continue
             if around and _runs_into(covering, hand, there.angles, around):
                 continue
@@ -183,31 +186,18 @@ def find_grasp(
     if best is None:
         turned_down = sum(one.turned_down for one in draws.values())
         blocked = f", or out of reach: {', '.join(around.names)} blocked {turned_down} more" if around else ""
+        with_palm = ", palm and digits on it" if palm else ""
         taken = ", ".join(dict.fromkeys(kinds[: -(-count // _ROUND)]))
         raise InputError(
             f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
-            f"(postures {taken}): it may be too small, too smooth or too heavy to one side{blocked}"
+            f"(postures {taken}){with_palm}: {fault_of(draws[first], friction)}{blocked}"
         )
     return replace(best, tried=tried)
 
 
-def _refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
-    """Refuse an object of which no part fits between thumb and fingers.
-
-    Raises:
-        InputError: States the object's smallest width and the hand's widest opening.
-    """
-    thing, widest = draws.near.thing, draws.widest
-    if thing.size.min() <= _SLACK * widest:  # an object this thin is hardly ever too wide, and measuring widths is slow
-        return
-    narrowest = draws.narrowest(friction)
-    if narrowest > _SLACK * widest:
-        doubt = doubt_of_size(thing, hand_length(draws.covering.skeleton), None)
-        also = f"; it {doubt}" if doubt else "; two hands may take it (GRASP … BOTH … AUTO)"
-        raise InputError(
-            f"object {thing.name}: too wide for this hand: nowhere narrower than {1e3 * narrowest:.0f} mm, and thumb "
-            f"and fingers open to {1e3 * widest:.0f} mm{also}"
-        )
+def _power(verdict: Verdict, digits: Sequence[str]) -> bool:
+    """Whether a grasp by these digits is a power grip."""
+    return verdict.palm and len(verdict.digits) >= len(digits) - 1
 
 
 def _best_first(

@@ -70,8 +70,18 @@ class Draws:
     @cached_property
     def widest(self) -> float:
         """Largest opening between thumb and fingers in any posture [m]."""
+        return max(float(one.width[0]) for one in self._in_air)
+
+    @cached_property
+    def least(self) -> float:
+        """Smallest distance between thumb and fingers while they close, in any posture [m]."""
+        return min(float(one.width.min()) for one in self._in_air)
+
+    @cached_property
+    def _in_air(self) -> list[Opening]:
+        """Opening of the hand in every posture while it closes on nothing."""
         starts = np.array([posture_angles(self.covering.skeleton, self.side, posture) for posture in POSTURES])
-        return max(float(one.width[0]) for one in closing_in_air(self.covering, self.side, starts, self.closing))
+        return closing_in_air(self.covering, self.side, starts, self.closing)
 
     def narrowest(self, friction: float) -> float:
         """Smallest sampled width of the object that two contacts with this friction can hold [m].

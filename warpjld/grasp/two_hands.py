@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,13 @@ from warpjld.grasp.find_grasp import AutoGrasp
 from warpjld.grasp.judge import Judge, Pressing, Verdict, check_friction
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
+from warpjld.grasp.palm import palm_of
 from warpjld.grasp.placements import Candidates, around, palms_on
 from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.random_placements import WAY, preference
 from warpjld.grasp.widths import Widths, sample_widths
+from warpjld.skeleton import CHANNELS, DIGITS, Skeleton, poses_from_angles
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["find_two_handed"]
 
@@ -29,6 +33,7 @@ _LINES = 400  # random lines through the object, to find opposite sides
 _ROUND = 24  # placements per round (batch)
 _DEEPEST = 6e-4  # largest penetration of hands and object in a grasp that is accepted [m]
 _APART = 5e-3  # smallest distance between the skins of the two hands [m]
+_BACK = np.radians(30.0)  # extension of the fingers while the palm approaches [rad]
 _COMES = (0.0, 0.1, 0.3, 0.6, 1.0)  # distances back along the approach, in units of WAY, at which collisions are tested
 
 
@@ -45,7 +50,9 @@ class _Side:
         """Place G hands by palm centre, palm normal and direction of the fingers, each (G, 3), and close them."""
         covering = self.closer.covering
         skeleton = covering.skeleton
-        hands = palms_on(covering, skeleton.initial, self.closer.both.near, self.name, aim, look, fingers)
+        hands = palms_on(
+            covering, bent_back(covering.skeleton, self.name), self.closer.both.near, self.name, aim, look, fingers
+        )
         digits = [f"{self.name}.{digit}" for digit in self.judge.digits]
         closed = self.closer.close(hands.poses(skeleton), hands.angles, digits=digits, coupling=(1.0, 0.7))
         poses = hands.poses(skeleton, closed.angles)
@@ -57,6 +64,27 @@ class _Side:
             ways = [opened + (part * shifts).astype(np.float32) for part in _COMES]
             clear = np.all([self.around.missed(way) for way in (*ways, skins)], axis=0)
         return _Ended(hands, closed, skins, self.judge.pressing(poses, skins), clear)
+
+
+def bent_back(skeleton: Skeleton, side: str) -> NDArray[np.float64]:
+    """Angles of a hand whose digits are bent back, so that its palm is what meets an object first [rad], (J, 4).
+
+    Fingers bend back at their base by 30°; the thumb is turned to where its joints lie least before the palm, of the
+    ends of its base joint's ranges."""
+    angles = skeleton.initial.copy()
+    there = {digit: f"{side}.{digit}.base" for digit in DIGITS if f"{side}.{digit}.base" in skeleton.names}
+    for name in (name for digit, name in there.items() if digit != "thumb"):
+        row = skeleton.index(name)
+        angles[row, FLEXION] = max(angles[row, FLEXION] - _BACK, skeleton.limits[row, FLEXION, 0])
+    if "thumb" not in there:
+        return angles
+    row = skeleton.index(there["thumb"])
+    ends = np.column_stack([skeleton.limits[row], angles[row]])
+    tried = np.repeat(angles[None], 3 ** len(CHANNELS), axis=0)
+    tried[:, row] = list(product(*ends))
+    chain = [skeleton.index(name) for name in skeleton.names if name.startswith(f"{side}.thumb.")]
+    ahead = poses_from_angles(skeleton, tried).positions[:, chain] @ palm_of(skeleton, side).normal
+    return np.asarray(tried[ahead.max(axis=1).argmin()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +118,10 @@ def find_two_handed(
     """Find a grasp with two hands: place them on opposite sides of the object, close, judge both together.
 
     The palms face one another along a line through the object whose ends lie within the friction cones; the fingers of
-    both point in the same direction. A grasp is accepted if the contacts of both hands together are force closed, both
-    hands press, neither penetrates the object by more than 0.6 mm, and the hands stay 5 mm apart.
+    both point in the same direction. Fingers are extended until a palm
+    touches the object, and then close. A grasp is accepted if the contacts of both hands together are force closed,
+    both hands press, neither penetrates the object by more than 0.6 mm, and the hands stay 5 mm apart. Grasps in which
+    both palms are in contact rank above those held by fingers alone.
 
     Args:
         hands: The hands by side, ``left`` and ``right``, smooth method.
@@ -102,7 +132,8 @@ def find_two_handed(
         seed: Seed of the random numbers.
 
     Returns:
-        The grasp of each side; both have the verdict on the two together.
+        The grasp of each side; both have the verdict on the two together. Their posture is ``palms`` if both palms are
+        in contact, else ``fingers``.
 
     Raises:
         InputError: A side is missing, the object has no opposite sides, or no placement led to a grasp.
@@ -129,7 +160,7 @@ def find_two_handed(
         ended = _placed(sides, widths, near.thing, batch, rng)
         for g in range(batch):
             verdict = _together(sides, ended, g, friction)
-            if verdict is not None and verdict.score > (best["left"].score if best else 0.0):
+            if verdict is not None and _rank(verdict) > (_rank(best["left"].verdict) if best else (False, 0.0)):
                 best = {side.name: _grasp(side, one, g, verdict, tried) for side, one in zip(sides, ended, strict=True)}
     if not best:
         widest = 1e3 * float(widths.width.max())
@@ -178,11 +209,17 @@ def _together(sides: list[_Side], ended: list[_Ended], g: int, friction: float) 
         np.concatenate([one.spin for one in several]),
     )
     digits = tuple(f"{side.name}.{name}" for side, one in zip(sides, pressing, strict=True) for name in one.digits)
-    return sides[0].judge.verdict(contacts, digits, any(one.palm for one in pressing), depth)
+    return sides[0].judge.verdict(contacts, digits, all(one.palm for one in pressing), depth)
+
+
+def _rank(verdict: Verdict) -> tuple[bool, float]:
+    """What closes: both palms before fingers alone, then the better score."""
+    return verdict.closed and verdict.palm, verdict.score
 
 
 def _grasp(side: _Side, ended: _Ended, g: int, verdict: Verdict, tried: int) -> AutoGrasp:
     hands = ended.hands
     touching = tuple(name for name in verdict.digits if name.startswith(f"{side.name}."))
     place = hands.position[g], hands.rotation[g], hands.approach[g], hands.angles[g]
-    return AutoGrasp("palms", *place, ended.closed.angles[g], verdict, touching, tried)
+    posture = "palms" if verdict.palm else "fingers"
+    return AutoGrasp(posture, *place, ended.closed.angles[g], verdict, touching, tried)

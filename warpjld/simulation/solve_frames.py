@@ -16,6 +16,7 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct_frames import CorrectedDigit, correct_frame, uncorrected
 from warpjld.simulation.grip.find import FoundGrip, find_grip
 from warpjld.simulation.grip.kept import grip_content, restored_grip
+from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
@@ -179,8 +180,8 @@ class _Run:
         """Solve and append a frame; returns the final result if the frame cannot be solved."""
         model, time, before = self.model, frame - self.model.start, self.last
         now = np.zeros_like(model.body.mesh.nodes) if before is None else before.last.displacement
-        steps = self.substeps.times(model, 0.0 if before is None else before.last.time, time, now)
         since = 0.0 if before is None else before.last.time
+        steps = self._as_searched(model, since, self.substeps.times(model, since, time, now))
         if self.request.limited:
             try:
                 solution = self.limits.solve(model, self.history, before, steps)
@@ -219,6 +220,17 @@ class _Run:
         if all(grip.first != frame for grip in self.contact.grips):  # otherwise after the grip search
             self._settle()
         return None
+
+    def _as_searched(self, model: ContactModel, since: float, steps: list[float]) -> list[float]:
+        """Times of a step in which a grip closes, no farther apart than the search's own: friction's forces depend on
+        the length of steps, and the grip was chosen by those of short ones."""
+        closing = [one.request for one in self.grips if one.edits]
+        if all(one.last <= model.start + since or one.first > model.start + since for one in closing):
+            return steps
+        ends, count = (since, steps[-1]), len(steps)
+        for hand in (one for one in model.hands if any(one.name == grip.actor for grip in closing)):
+            count = max(count, hand.bones.steps([(hand.bones.angles(at), at) for at in ends], TRAVEL))
+        return [since + (steps[-1] - since) * (k + 1) / count for k in range(count - 1)] + [steps[-1]]
 
     def save(self, checkpoint: CheckpointFile) -> bool:
         """Save the solved frames; returns False if there are none."""

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from warpjld.tables.columns import Column
 
-__all__ = ["GRASP_COLUMNS", "SCORE_COLUMNS"]
+__all__ = ["GRASP_COLUMNS", "PRESSED_COLUMNS", "SCORE_COLUMNS"]
 
+_PARTS = ("thumb", "index", "middle", "ring", "pinky", "palm")
 _PLANNED = (
     Column("hand", "text", "", "Name of the hand in the study file."),
     Column("object", "text", "", "Name of the object in the study file."),
@@ -32,7 +33,7 @@ _TOUCH = (
     Column("digits", "integer", "", "Number of digits in contact, thumb included, palm not."),
     Column("area", "number", "m²", "Area of skin in contact."),
     *(Column(f"area_{part}", "number", "m²", f"Area of skin of the {part} in contact.")
-      for part in ("thumb", "index", "middle", "ring", "pinky", "palm")),
+      for part in _PARTS),
 )  # fmt: skip
 _MEASURED = (
     Column("penetration", "number", "m", "The larger of skin_inside and object_inside."),
@@ -65,3 +66,22 @@ SCORE_COLUMNS = (
     Column("grasp", "text", "", "Name of the grasp in its file."), *_PLANNED, *_WRIST, *_TOUCH, *_MEASURED
 )  # fmt: skip
 """Columns for grasps from other programs, whose approach is unknown."""
+
+PRESSED_COLUMNS = (
+    Column("weight", "number", "N", "What hangs on the object."),
+    Column("press", "text", "", "How contact was solved: REACHED, or why the force was not; empty where the grasp"
+           " is no success."),
+    Column("asked_force", "number", "N", "Sum of the digits' forces that holds the weight with the study's margin."),
+    Column("grip", "number", "rad", "How far each joint bent on."),
+    Column("force", "number", "N", "Sum over the digits of the length of what contact puts on their bones."),
+    Column("normal_force", "number", "N", "What presses on the skin of the whole hand, summed over its area."),
+    Column("pressed_area", "number", "m²", "Skin under pressure."),
+    Column("peak_pressure", "number", "Pa", "Highest pressure: what presses on a node over the skin around it."),
+    Column("muscle_share", "number", "", "Largest share of the muscles' limits, in force or in a joint's torque."),
+    Column("strained", "text", "", "Digit that has it."),
+    *(Column(f"force_{part}", "number", "N", f"Length of the sum of the contact forces on the skin of the {part}.")
+      for part in _PARTS),
+    *(Column(f"pressed_area_{part}", "number", "m²", f"Skin of the {part} under pressure.") for part in _PARTS),
+    *(Column(f"share_{part}", "number", "", f"Share of the muscles' limits of the {part}.") for part in _PARTS[:-1]),
+)  # fmt: skip
+"""Further columns of a study that solves contact."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +12,7 @@ from warpjld.files.toml_table import TomlTable, read_toml
 from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
+from warpjld.study.grasping.pressing import Pressing, read_pressing
 
 __all__ = ["COMPUTING", "GraspPlan", "Measuring", "WristRange", "load_plan"]
 
@@ -31,6 +33,7 @@ class WristRange:
         offset: Distance of the palm's aim from the object's centre, relative to the object's half extent.
         best_of: 0 draws one placement from these ranges; n takes the best grasp of n placements of
             `warpjld.grasp.find_grasp.find_grasp` (the script's GRASP … AUTO), and the ranges are not used.
+        palm: With ``best_of``: accept power grips only: the palm and all digits but one are in contact.
     """
 
     elevation: tuple[float, float] = (-90.0, 90.0)
@@ -40,6 +43,7 @@ class WristRange:
     gap: tuple[float, float] = (0.0, 0.02)
     offset: tuple[float, float] = (0.0, 0.3)
     best_of: int = 0
+    palm: bool = False
 
 
 Posture = str | tuple[tuple[str, str, float], ...]
@@ -79,8 +83,8 @@ class Measuring:
 class GraspPlan:
     """Plan of a grasp study.
 
-    Trial k uses combination k modulo hands × objects × scales × frictions, frictions varying fastest. It does not
-    depend on the number of trials, so a study can be extended later.
+    Trial k uses combination k modulo hands × objects × scales × frictions × weights of ``pressing``, in this order,
+    the last varying fastest. It does not depend on the number of trials, so a study can be extended later.
     """
 
     title: str
@@ -95,10 +99,25 @@ class GraspPlan:
     coupling: tuple[float, float]
     wrist: WristRange
     measuring: Measuring
+    pressing: Pressing | None = None
+
+    @property
+    def combinations(self) -> int:
+        """How many there are."""
+        kinds = (self.hands, self.objects, self.scales, self.frictions, self._weights)
+        return math.prod(len(kind) for kind in kinds)
+
+    @property
+    def _weights(self) -> tuple[float | None, ...]:
+        return (None,) if self.pressing is None else self.pressing.weights
+
+    def weight(self, trial: int) -> float | None:
+        """What hangs on the object in a trial [N]; None where contact is not solved."""
+        return self._weights[trial % len(self._weights)]
 
     def combination(self, trial: int) -> tuple[HandChoice, ObjectChoice, float, float]:
         """Hand, object, scale and friction of a trial."""
-        rest, friction = divmod(trial, len(self.frictions))
+        rest, friction = divmod(trial // len(self._weights), len(self.frictions))
         rest, scale = divmod(rest, len(self.scales))
         rest, thing = divmod(rest, len(self.objects))
         return self.hands[rest % len(self.hands)], self.objects[thing], self.scales[scale], self.frictions[friction]
@@ -107,6 +126,10 @@ class GraspPlan:
         """Everything that determines the results, as JSON, with hashes in place of files."""
         settings = asdict(self)
         del settings["trials"], settings["title"]
+        if self.pressing is None:
+            del settings["pressing"]
+        if not self.wrist.palm:  # as in studies that were begun before there was such a choice
+            del settings["wrist"]["palm"]
         settings["hands"] = [hand.identity() for hand in self.hands]
         settings["objects"] = [thing.identity() for thing in self.objects]
         return settings | {"versions": {name: versions([name])[name] for name in COMPUTING}}
@@ -133,6 +156,7 @@ def load_plan(path: str | Path) -> GraspPlan:
         coupling=_read_coupling(top),
         wrist=_read_wrist(top.table("wrist")),
         measuring=_read_measuring(top.table("measuring")),
+        pressing=read_pressing(top.table("contact")) if "contact" in top else None,
     )
     top.finish()
     if plan.wrist.best_of and (len(plan.digits) < len(DIGITS) or not isinstance(plan.posture, str)):
@@ -180,7 +204,10 @@ def _read_wrist(table: TomlTable) -> WristRange:
         gap=_range(table, "gap", default.gap, 0.0, 1.0),
         offset=_range(table, "offset", default.offset, 0.0, 1.0),
         best_of=table.integer("best_of", default.best_of),
+        palm=table.truth("palm", default.palm),
     )
+    if found.palm and not found.best_of:
+        table.fail("palm", "is for best_of: ranges alone choose no grasp")
     table.finish()
     return found
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from warpjld.study.arrays import gathered
 from warpjld.study.grasping.plan import GraspPlan, load_plan
 from warpjld.study.grasping.trial import GraspExperiment
 from warpjld.study.rerun import Rerun, rerun_trial
@@ -84,8 +85,11 @@ class Study:
         allow_mixed: bool = False,
         report: Callable[[str, int, int], None] = lambda what, done, total: None,
     ) -> StudyResult:
-        """Run the missing trials of the study in a folder; arguments and errors as for ``run_study``."""
-        return run_study(
+        """Run the missing trials of the study in a folder; arguments and errors as for ``run_study``.
+
+        Where contact is solved, ``grips.png`` and ``pressure.png`` are drawn too.
+        """
+        result = run_study(
             self.experiment,
             out,
             processes=processes,
@@ -96,6 +100,13 @@ class Study:
             allow_mixed=allow_mixed,
             report=report,
         )
+        if self.plan.pressing is None:
+            return result
+        from warpjld.study.grasping.grip_plots import write_grip_plots
+
+        folder = Path(out)
+        rows, arrays = gathered(opened(self.experiment, folder).all(self.experiment.trials))
+        return replace(result, files=(*result.files, *write_grip_plots(folder, self.plan, rows, arrays)))
 
     def rerun(
         self,

@@ -15,33 +15,34 @@ from warpjld.errors import InputError
 from warpjld.grasp.close import Closer
 from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
-from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.postures import posture_for
 from warpjld.grasp.quality import ContactPatches
 from warpjld.grasp.segments import SEGMENTS
 from warpjld.skeleton import poses_from_angles
 from warpjld.study.experiment import Outcome, generator
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice
-from warpjld.study.grasping.columns import GRASP_COLUMNS
-from warpjld.study.grasping.load import Thing, closer_of, device_identity, hand_of, opened_hand, thing_of
+from warpjld.study.grasping.columns import GRASP_COLUMNS, PRESSED_COLUMNS
+from warpjld.study.grasping.load import Hand, Thing, closer_of, device_identity, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.variety import varieties
-from warpjld.study.grasping.wrist import Approach, draw_approach, place_palm, touch_along
+from warpjld.study.grasping.wrist import backed_off, draw_approach, place_palm, touch_along
 from warpjld.tables.columns import Column
 
 __all__ = ["GraspExperiment"]
 
 Array = NDArray[np.float64]
 
-_CLEAR = 5e-4  # smallest distance of the open hand from the object [m]
-_BACKED_OFF = 0.25  # largest distance that the open hand is moved back to reach that [m]
+_GROUPS = ("hand", "object", "scale", "friction")
+_SHOWN = ("penetration", "epsilon", "area", "volume", "displacement", "overlap")
+_SHOWN_PRESSED = ("force", "normal_force", "pressed_area", "peak_pressure", "muscle_share", "epsilon")
 
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A closed hand: angles (J, 4), displacement and rotation of its root, whether it touches, values by column."""
+    """A closed hand: open and closed angles (J, 4), place of its root, whether it touches, values by column."""
 
+    start: Array
     angles: Array
     position: Array
     rotation: Array
@@ -72,10 +73,22 @@ class GraspExperiment:
     device: str = "cpu"
     _ahead: dict[int, _Tried | Outcome] = field(default_factory=dict, compare=False, repr=False)
 
-    columns: ClassVar[tuple[Column, ...]] = GRASP_COLUMNS
     success: ClassVar[str] = "success"
-    shown: ClassVar[tuple[str, ...]] = ("penetration", "epsilon", "area", "volume", "displacement", "overlap")
-    groups: ClassVar[tuple[str, ...]] = ("hand", "object", "scale", "friction")
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Those of grasps, and of contact where it is solved."""
+        return (*GRASP_COLUMNS, *(() if self.settings.pressing is None else PRESSED_COLUMNS))
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Of grasps, or of contact."""
+        return _SHOWN if self.settings.pressing is None else _SHOWN_PRESSED
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """What a plan combines."""
+        return (*_GROUPS, *(() if self.settings.pressing is None else ("weight",)))
 
     @property
     def trials(self) -> int:
@@ -109,7 +122,8 @@ class GraspExperiment:
     def plan(self, trial: int) -> dict[str, Any]:
         """Columns that are known before the trial."""
         hand, thing, scale, friction = self.settings.combination(trial)
-        return {"hand": hand.name, "object": thing.name, "scale": scale, "friction": friction}
+        weight = {} if self.settings.pressing is None else {"weight": self.settings.weight(trial)}
+        return {"hand": hand.name, "object": thing.name, "scale": scale, "friction": friction, **weight}
 
     def check(self) -> list[str]:
         """Load all hands and objects once, to find errors before the study; returns notes on them.
@@ -157,7 +171,7 @@ class GraspExperiment:
         if trial in self._ahead:
             tried = self._ahead.pop(trial)
         elif best_of:
-            tried = self._best_of(best_of, choice, wanted, scale, friction, rng)
+            tried = self._best_of(best_of, choice, wanted, scale, friction, self._search_seed(trial, rng))
         else:
             (tried,) = self._closed([self._placed(choice, wanted, scale, rng)], choice, wanted, scale)
         if isinstance(tried, Outcome):
@@ -171,8 +185,31 @@ class GraspExperiment:
         both = self._closer(choice, wanted, scale).both
         measured, patches = measure_grasp(hand, thing, both, vertices, friction, self.settings.measuring)
         kept = {"angles": tried.angles, **root, **_by_segment(patches)}
+        pressed, pressure, message = self._pressed(trial, hand, thing, tried, friction, measured["success"])
+        if pressure is not None:
+            kept["pressure"] = pressure
         arrays = {f"{choice.name}/{name}": array for name, array in kept.items()}
-        return Outcome("closed" if tried.touches else "no contact", {**tried.values, **placed, **measured}, arrays)
+        values = {**tried.values, **placed, **measured, **pressed}
+        return Outcome("closed" if tried.touches else "no contact", values, arrays, message)
+
+    def _search_seed(self, trial: int, rng: np.random.Generator) -> int:
+        """Seed of a search for the best placement: the trial's own, or where contact is solved the same for all
+        combinations, so that every weight hangs on the same grasp."""
+        if self.settings.pressing is not None:
+            rng = generator(self.seed, trial // self.settings.combinations)
+        return int(rng.integers(2**31))
+
+    def _pressed(
+        self, trial: int, hand: Hand, thing: Thing, tried: _Tried, friction: float, success: bool
+    ) -> tuple[dict[str, Any], Array | None, str]:
+        """Contact of a grasp that succeeds, where the plan asks for it."""
+        how, weight = self.settings.pressing, self.settings.weight(trial)
+        if how is None or weight is None or not success:
+            return {}, None, ""
+        from warpjld.study.grasping.press_grasp import press_grasp
+
+        placed = (tried.start, tried.angles, tried.position, tried.rotation)
+        return press_grasp(hand, thing, *placed, friction=friction, weight=weight, how=how)
 
     def alike(self, trial: int) -> tuple[HandChoice, ObjectChoice, float]:
         """Hand, object and scale; trials in which these are equal are closed in one batch."""
@@ -204,7 +241,7 @@ class GraspExperiment:
         turn, shift = place_palm(hand.palm, approach, start + (approach.gap - way) * approach.direction)
         posture = self.settings.posture
         opened = opened_hand(choice, posture_for(thing.body.size) if posture == "auto" else posture)
-        back = _room(opened.skin, self._closer(choice, wanted, scale).both.near, turn, shift, approach)
+        back = backed_off(opened.skin, self._closer(choice, wanted, scale).both.near, turn, shift, approach)
         if back is None:
             return Outcome("no room", values, message="the open hand does not fit beside the object")
         values["gap"] = approach.gap + back
@@ -231,7 +268,7 @@ class GraspExperiment:
         closed = closer.close(poses, angles, digits=self.settings.digits, coupling=coupling)
         touches = np.asarray(closed.touching().any(axis=1))
         ended = iter(
-            _Tried(closed.angles[g], hand.position, hand.rotation, bool(touches[g]), hand.values)
+            _Tried(hand.angles, closed.angles[g], hand.position, hand.rotation, bool(touches[g]), hand.values)
             for g, hand in enumerate(hands)
         )
         return [item if isinstance(item, Outcome) else next(ended) for item in placed]
@@ -243,7 +280,7 @@ class GraspExperiment:
         wanted: ObjectChoice,
         scale: float,
         friction: float,
-        rng: np.random.Generator,
+        seed: int,
     ) -> _Tried | Outcome:
         """The best grasp of ``count`` placements, by ``find_grasp`` as in the script's GRASP … AUTO."""
         posture = self.settings.posture
@@ -258,12 +295,13 @@ class GraspExperiment:
                 posture=None if posture == "auto" else posture,
                 coupling=self.settings.coupling if any(self.settings.coupling) else None,
                 friction=friction,
-                seed=int(rng.integers(2**31)),
+                palm=self.settings.wrist.palm,
+                seed=seed,
             )
         except InputError as error:
             return Outcome("no grasp", message=str(error))
         values = _direction(-found.approach)
-        return _Tried(found.angles, found.position, found.rotation, bool(found.touching), values)
+        return _Tried(found.start, found.angles, found.position, found.rotation, bool(found.touching), values)
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         """Draw three views of the closed hand and its object, see `draw_grasp`."""
@@ -285,18 +323,6 @@ def _as_in_a_plan(unit: str) -> str:
 
 def _direction(away: Array) -> dict[str, Any]:
     return dict(zip(("approach_x", "approach_y", "approach_z"), away, strict=True))
-
-
-def _room(opened: Array, near: NearObject, turn: Array, shift: Array, approach: Approach) -> float | None:
-    """Distance the open hand must be moved back to be clear of the object [m]; None if more than ``_BACKED_OFF``."""
-    skin, back = opened @ turn.T + shift, 0.0
-    while back <= _BACKED_OFF:
-        nearest = float(near.least((skin + back * approach.direction)[None])[0])
-        if nearest >= _CLEAR:
-            return back
-        # lower bound of the remaining distance
-        back += max(_CLEAR - nearest, 1e-4)
-    return None
 
 
 def _by_segment(patches: ContactPatches) -> dict[str, Array]:

@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.grasp import ObjectSet
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.palm import Palm
 from warpjld.study.grasping.plan import WristRange
 
-__all__ = ["Approach", "draw_approach", "place_palm", "touch_along"]
+__all__ = ["Approach", "backed_off", "draw_approach", "place_palm", "touch_along"]
 
 Array = NDArray[np.float64]
+
+_CLEAR = 5e-4  # the open hand starts at least this far from the object [m]
+_BACKED_OFF = 0.25  # a palm that cannot come nearer than this is not beside the object [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,3 +86,15 @@ def place_palm(palm: Palm, approach: Approach, point: Array) -> tuple[Array, Arr
         -approach.direction, approach.fingers
     )
     return turn, point - turn @ palm.middle
+
+
+def backed_off(opened: Array, near: NearObject, turn: Array, shift: Array, approach: Approach) -> float | None:
+    """How far the open hand must be moved back until it is clear of the object [m]; None if too far."""
+    skin, back = opened @ turn.T + shift, 0.0
+    while back <= _BACKED_OFF:
+        nearest = float(near.least((skin + back * approach.direction)[None])[0])
+        if nearest >= _CLEAR:
+            return back
+        # not nearer than this can it be clear: the object is that deep in the hand
+        back += max(_CLEAR - nearest, 1e-4)
+    return None

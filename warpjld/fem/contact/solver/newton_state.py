@@ -266,10 +266,12 @@ class NewtonState:
 
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:
         """Contact points after a move, searched again until that no longer changes the gaps."""
-        points = [shifted(p, (self.u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
-_STALE = 0.025
-"""Movement of a node since the last search for contact points, over the search distance, from which on points are
-searched again: along a curved surface gaps change with its square."""
+        stale = self._settled and not all(interface.slides for interface in self.system.interfaces)
+        if stale and np.abs(self.u - self._seen[1]).max() > _STALE * self.system.reach:
+            self._settled = False
+            self._seen = (self.system.points(self.u, self.step, self.system.normals(self.u)), self.u)
+            return self._seen[0]
+        points = self._moved(self.u)
         if not self._settled:
             self._normals = self.system.turned(self._normals, self.u, self._iteration < _TURNING)
             fresh = self.system.points(self.u, self.step, self._normals)

@@ -1,0 +1,128 @@
+"""A grasp pressed until its digits hold a weight: contact of the hand's flesh with the object (R123)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpjld.errors import WarpjldError
+from warpjld.simulation.grip.force import ForceStatus
+from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
+from warpjld.simulation.report.table import ContactRow
+from warpjld.simulation.simulate import Simulation, simulate
+from warpjld.simulation.specification import (
+    ContactSpecification,
+    FleshMaterial,
+    GripSpecification,
+    SolveSpecification,
+    name_pair,
+)
+from warpjld.skeleton import DIGITS
+from warpjld.study.grasping.load import Hand, Thing
+from warpjld.study.grasping.pressing import Pressing
+
+__all__ = ["press_grasp"]
+
+Array = NDArray[np.float64]
+
+_HAND, _OBJECT = "hand", "object"
+_CLOSING = (0.0, 0.8, 0.95, 1.0, 1.0)
+"""Parts of the way from the open to the closed hand, by frame: contact begins on the last of it."""
+_CLOSED = 3
+"""Frame at which the hand has closed; the digits have bent on at the next."""
+_KNUCKLES = ("base", "knuckle2", "knuckle3")
+
+
+def press_grasp(
+    hand: Hand,
+    thing: Thing,
+    start: Array,
+    angles: Array,
+    position: Array,
+    rotation: Array,
+    *,
+    friction: float,
+    weight: float,
+    how: Pressing,
+) -> tuple[dict[str, Any], Array | None, str]:
+    """Bend all digits on alike, as ``SQUEEZE … FORCE`` does, until they press with the force that a weight needs.
+
+    Args:
+        hand: Whose flesh.
+        thing: What is held; it is rigid and stays where it is.
+        start: Angles of the open hand [rad], shape (J, 4).
+        angles: Those of the closed hand, likewise.
+        position: Displacement of the root from rest [m], shape (3,).
+        rotation: Rotation of the root about its rest place, quaternion x, y, z, w.
+        friction: Coulomb coefficient of skin on object.
+        weight: What is to be held [N].
+        how: Settings.
+
+    Returns:
+        Columns; contact pressure on the skin's vertices [Pa], shape (V,), None where nothing was solved; a message.
+    """
+    asked = how.force(weight, friction)
+    ways = np.array(_CLOSING)[:, None, None] * (angles - start) + start
+    # recorded angles have no turn of the root: the hand stays at rest, and the object stands where the hand sees it
+    back, root = Rotation.from_quat(rotation).inv(), hand.rig.skeleton.rest[0]
+    place = {"positions": root - back.apply(root + position), "rotations": back.as_quat()}
+    animation = RecordedAnimation(
+        [RecordedActor(_HAND, hand.rig, angles=ways, covering=hand.covering)],
+        [RecordedObject(_OBJECT, thing.body, **place)],
+    )
+    try:
+        found = simulate(_specification(hand, asked, friction, how), animation)
+    except WarpjldError as error:
+        return {"press": ForceStatus.NO_SOLUTION.name, "asked_force": asked, "success": False}, None, str(error)
+    values: dict[str, Any] = {"press": _ending(found), "asked_force": asked, "success": False}
+    if not found.grips or not len(found.frames) or found.frames[-1] <= _CLOSED:
+        return values, None, found.verdict.text
+    last = float(found.frames[-1])
+    rows = [row for row in found.rows if row.frame == last and row.actor == _HAND]
+    seen = found.visible_pressure(_HAND, last).pressure[: hand.rig.surface.vertices.shape[0]]
+    values |= _measured(found, rows)
+    reached = values["press"] == ForceStatus.REACHED.name
+    values["success"] = reached and how.kept(values["force"], asked=asked)
+    message = found.grips[0].text if not values["success"] else ""
+    if reached and message:
+        message += f"; at the last frame they press with {values['force']:.3g} N"
+    return values, np.asarray(seen), message
+
+
+def _specification(hand: Hand, asked: float, friction: float, how: Pressing) -> ContactSpecification:
+    channels = tuple(f"{hand.side}.{digit}.{knuckle}.flexion" for digit in DIGITS for knuckle in _KNUCKLES)
+    most = float(np.radians(how.most))
+    grip = GripSpecification(_HAND, _OBJECT, _CLOSED, _CLOSED + 1, channels, most=most, force=asked)
+    return ContactSpecification(
+        flesh={_HAND: FleshMaterial(element=how.element, itself=False)},
+        friction={name_pair(_HAND, _OBJECT): friction},
+        grips=[grip],
+        pressing=SolveSpecification(0, _CLOSED + 1, rigid=True),
+    )
+
+
+def _ending(found: Simulation) -> str:
+    """How it ended: the grip's own word where all was solved, else the solver's."""
+    return found.grips[0].status if found.grips and found.verdict.status == "CONVERGED" else found.verdict.status
+
+
+def _measured(found: Simulation, rows: list[ContactRow]) -> dict[str, Any]:
+    parts = {row.digit: row for row in rows}
+    digits = [parts[digit] for digit in DIGITS if digit in parts]
+    worst = max(digits, key=lambda row: row.share)
+    last = found.solved.frames[-1]
+    return {
+        "grip": found.grips[0].grip,
+        "force": sum(row.bone_n for row in digits),
+        "normal_force": float(last.nodal_contact.force[:, found.model.spans[_HAND]].sum()),
+        "pressed_area": 1e-6 * sum(row.area_mm2 for row in rows),
+        "peak_pressure": 1e3 * max(row.peak_kpa for row in rows),
+        "muscle_share": worst.share,
+        "strained": worst.digit,
+        **{f"force_{name}": row.force_n for name, row in parts.items()},
+        **{f"pressed_area_{name}": 1e-6 * row.area_mm2 for name, row in parts.items()},
+        **{f"share_{row.digit}": row.share for row in digits},
+    }
