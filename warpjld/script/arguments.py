@@ -214,6 +214,11 @@ class Arguments:
         self._next += 1
         return value.text
 
+    def next_word(self) -> str | None:
+        """The word or quoted text that comes next, which is not read; None where none does."""
+        value = self._peek()
+        return value.text if isinstance(value, Word | Text) else None
+
     def new_name(self, what: str) -> str:
         """As ``name``, for what is to be called so: files carry it too."""
         name = self.name(what)

@@ -18,10 +18,12 @@ from warpjld.simulation.specification import (
     SourceLocation,
     name_pair,
 )
+from warpjld.skeleton.segments import SEGMENT_JOINTS, segment_joints
 from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.script.props import Prop
+    from warpjld.skeleton import Skeleton
 
 _LAWS = tuple(law.upper() for law in LAWS)
 
@@ -77,10 +79,13 @@ def physical(scene: Scene, arguments: Arguments) -> None:
 @command(
     "FLESH",
     syntax=(
-        "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
-        "[POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>]"
+        "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM … or <segment> …] [ELEMENT <metres>] [YOUNG <pascals>] "
+        "[SKIN <pascals>] [POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>] [FLEXION]"
     ),
-    help="An actor's flesh deforms, of some digits or the palm only if named; ITSELF: whether skin touches skin.",
+    help=(
+        "An actor's flesh deforms, of some digits or the palm, or of segments as left.forearm, only if named; ITSELF: "
+        "whether skin touches skin; FLEXION: bending alone deforms it, too."
+    ),
     group="Contact",
 )
 def flesh(scene: Scene, arguments: Arguments) -> None:
@@ -93,6 +98,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
     digits = []
     while (digit := arguments.keyword(*DIGIT_WORDS, "PALM")) is not None:
         digits.append(digit.lower())
+    segments = _segments(arguments, actor.skeleton) if not digits else []
     options = arguments.options(
         *DIGIT_WORDS,
         "PALM",
@@ -102,11 +108,26 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
         poisson=lambda: arguments.number("Poisson's ratio", minimum=0.3, maximum=0.49),
         stiffening=lambda: arguments.number("the exponent of Fung's law", minimum=0.0, maximum=100.0),
         itself=lambda: arguments.choice("ON or OFF", ("ON", "OFF")) == "ON",
+        flexion=lambda: True,
     )
     if "young" in options:
         options["flesh"] = options.pop("young")
-    named = tuple(dict.fromkeys(digits))
-    scene.contact.flesh[actor.name] = FleshMaterial(named, **options, where=place(arguments))  # type: ignore[arg-type]
+    named, parts = tuple(dict.fromkeys(digits)), tuple(dict.fromkeys(segments))
+    material = FleshMaterial(named, parts, **options, where=place(arguments))  # type: ignore[arg-type]
+    scene.contact.flesh[actor.name] = material
+
+
+def _segments(arguments: Arguments, skeleton: Skeleton) -> list[str]:
+    """Segments that are named next: words with a side before a dot, or of anatomy, that are no option."""
+    out = []
+    while (word := arguments.next_word()) is not None and ("." in word or word.lower() in SEGMENT_JOINTS):
+        name = arguments.name("a segment's name").lower()
+        try:
+            segment_joints(skeleton, name)
+        except InputError as error:
+            raise arguments.error(error.message) from None
+        out.append(name)
+    return out
 
 
 @command(
