@@ -15,7 +15,7 @@ from warpjld.geometry.surface import Part, weld_surface
 from warpjld.grasp.feature_normals import face_normals
 from warpjld.grasp.validation import MeshReport, mend
 
-__all__ = ["GraspObject", "Places", "make_object"]
+__all__ = ["GraspObject", "Places", "VolumeCells", "make_object"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +69,23 @@ class Places:
 
 
 @dataclass(frozen=True, eq=False)
+class VolumeCells:
+    """The volume mesh of an object, from a file.
+
+    Attributes:
+        nodes: In the object's frame [m], shape (N, 3).
+        elements: Hexahedra, prisms and tetrahedra as degenerate ones among them, shape (E, 8).
+        regions: Region of each, shape (E,).
+        region_names: Of the regions.
+    """
+
+    nodes: NDArray[np.float64]
+    elements: NDArray[np.int32]
+    regions: NDArray[np.int32]
+    region_names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class GraspObject:
     """A rigid object.
 
@@ -82,6 +99,7 @@ class GraspObject:
         numbers: Number that every vertex has in the file, shape (n,); None where it is its row.
         facets: Facet of the file, triangle or larger polygon, that every triangle is a part of, shape (t,); None where
             it is its row. People count facets so (R133); functions that take a triangle say so.
+        cells: Its volume mesh, where its file has one.
 
     Examples:
         >>> ball = wj.shapes.ball(0.065).placed((0.0, -0.05, -0.06))
@@ -99,6 +117,7 @@ class GraspObject:
     origin: str = ""
     numbers: NDArray[np.int64] | None = None
     facets: NDArray[np.int64] | None = None
+    cells: VolumeCells | None = None
 
     def facet_of(self, triangle: int) -> int:
         """The file's number of the facet that a triangle is a part of."""
@@ -134,7 +153,8 @@ class GraspObject:
         """
         if not (np.isfinite(factor) and factor > 0.0):
             raise InputError(f"scale: want a number above 0, got {factor:g}")
-        return replace(self, vertices=self.vertices * factor)
+        cells = None if self.cells is None else replace(self.cells, nodes=self.cells.nodes * factor)
+        return replace(self, vertices=self.vertices * factor, cells=cells)
 
     def check_facet(self, facet: int) -> int:
         """The row of a triangle, or an InputError that says which there are."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -35,6 +36,7 @@ class ObjectMaterial:
         element: Edge length of its elements [m]; None chooses.
         made_of: Its name in the catalogue of materials, if it is of one: what friction goes by.
         prestress: Stress at rest in its own axes, xx yy zz xy yz zx [Pa] (R98): what is not held relaxes it.
+        regions: Laws of regions of its volume file, by name; those without one have the object's (R141).
         where: Place in a script, for messages.
 
     Examples:
@@ -53,6 +55,7 @@ class ObjectMaterial:
     where: SourceLocation | None = None
     prestress: tuple[float, ...] = (0.0,) * 6
     made_of: str | None = None
+    regions: tuple[tuple[str, ObjectMaterial], ...] = ()
 
     def __post_init__(self) -> None:
         self.material()
@@ -64,6 +67,13 @@ class ObjectMaterial:
             raise InputError(f"pressure: want a finite pressure in Pa, got {self.pressure:g}")
         if self.pressure and not self.wall:
             raise InputError("pressure: only a hollow object has an inside to put under pressure")
+
+    def laws(self, name: str, regions: Sequence[str]) -> dict[str, Material]:
+        """Laws of the regions of its mesh, which are called ``name.region``, or ``name`` where there is only one."""
+        own, material = dict(self.regions), self.material()
+        if len(regions) < 2:
+            return {name: own[regions[0]].material() if regions and regions[0] in own else material}
+        return {f"{name}.{region}": own[region].material() if region in own else material for region in regions}
 
     def material(self) -> Material:
         """The law with its constants.

@@ -46,8 +46,8 @@ def segment_joints(skeleton: Skeleton, name: str) -> list[int]:
         found = [joint for joint, known in enumerate(skeleton.names) if skeleton.children[joint] and known == wanted]
     if not found:
         sides = [f"{one}.{word}" for one in ("left", "right") for word in SEGMENT_JOINTS]
-        known = [each for each in (*sides, *SEGMENT_JOINTS, *skeleton.names)]
-        raise InputError(f"there is no segment '{name}' in this skeleton{did_you_mean(wanted, known)}")
+        more = did_you_mean(wanted, (*sides, *SEGMENT_JOINTS, *skeleton.names))
+        raise InputError(f"there is no segment '{name}' in this skeleton{more}")
     return found
 
 

@@ -130,7 +130,7 @@ def joined_pairs(names: Sequence[str], joints: Sequence[str], parents: Sequence[
             one, other = names[a], names[b]
             joined = _base_of(one, other) or _base_of(other, one) or (_digit(one) == _digit(other) != "")
             if not joined and _digit(one) == _digit(other) == "":
-                joined = _palmar(one) and _palmar(other) or bool(ends.get(one, set()) & ends.get(other, set()))
+                joined = (_palmar(one) and _palmar(other)) or bool(ends.get(one, set()) & ends.get(other, set()))
             out[a, b] = out[b, a] = joined
     return out
 
@@ -232,7 +232,9 @@ def _unreachable(names: Sequence[str]) -> NDArray[np.bool_]:
     """Pairs of labels of which one cannot come to the other, whatever the joints do, symmetric, shape (L, L)."""
     words = [name.removesuffix(WEB).split(".")[-1].rstrip("0123456789") for name in names]
     whole = [name.removesuffix(WEB).split(".") for name in names]
-    low = np.array([bool({"toe1", "toe3", "toe5"} & set(w)) or word in _FEET for w, word in zip(whole, words, strict=True)])
+    low = np.array(
+        [bool({"toe1", "toe3", "toe5"} & set(w)) or word in _FEET for w, word in zip(whole, words, strict=True)]
+    )
     high = np.array([word in _HEADS for word in words])
     return np.asarray(low[:, None] & high | high[:, None] & low)
 

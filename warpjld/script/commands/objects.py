@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
@@ -25,7 +26,7 @@ _MODELLED = ("REVOLVE", "SWEEP", "SOFT")
 @command(
     "OBJECT",
     syntax=(
-        'OBJECT <name> <BALL/BOX/CYLINDER/PLATE/GLASS> [<metres> …] or OBJECT <name> "<surface file>" '
+        'OBJECT <name> <BALL/BOX/CYLINDER/PLATE/GLASS> [<metres> …] or OBJECT <name> "<surface or volume file>" '
         "[UNIT <M/CM/MM/…>] [UP <X/Y/Z>] [CENTRE] or OBJECT <name> REVOLVE <radius> <y> … or "
         "OBJECT <name> SWEEP <u> <v> … ALONG <x> <y> <z> … or OBJECT <name> SOFT <x> <y> <z> <radius> …, "
         "then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
@@ -141,12 +142,14 @@ def _color(arguments: Arguments) -> str:
 def _made(name: str, shape: str | None, sizes: list[float], path: object, options: dict[str, object]) -> GraspObject:
     from warpjld.grasp.object_file import load_object
     from warpjld.grasp.shapes import SHAPES
+    from warpjld.simulation.volume_object import VOLUME_FILES, load_volume_object
 
     scale = float(cast(float, options.get("scale", 1.0)))
     if shape is not None:
         return SHAPES[shape](*sizes, name=name).scaled(scale)
-    return load_object(
-        str(path),
+    load = load_volume_object if Path(str(path)).suffix.lower() in VOLUME_FILES else load_object
+    return load(
+        Path(str(path)),
         name=name,
         unit=str(options.get("unit", "m")),
         up=cast(Literal["x", "y", "z"], options.get("up", "y")),

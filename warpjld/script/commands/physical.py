@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
@@ -18,6 +19,7 @@ from warpjld.simulation.specification import (
     SourceLocation,
     name_pair,
 )
+from warpjld.simulation.volume_object import region_names
 from warpjld.skeleton.segments import SEGMENT_JOINTS, segment_joints
 from warpjld.suggest import did_you_mean
 
@@ -31,10 +33,13 @@ _LAWS = tuple(law.upper() for law in LAWS)
 @command(
     "PHYSICAL",
     syntax=(
-        f"PHYSICAL <object> [OF <material>] [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] [POISSON <ratio>] "
-        "[DENSITY <kg/m³>] [HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
+        f"PHYSICAL <object> [REGION <region>] [OF <material>] [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] "
+        "[POISSON <ratio>] [DENSITY <kg/m³>] [HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
     ),
-    help="An object deforms: OF what it is made, or law and moduli; a wall makes it hollow; its elements' size.",
+    help=(
+        "An object deforms: OF what it is made, or law and moduli, of one REGION of its volume file; a wall makes it "
+        "hollow; its elements' size."
+    ),
     group="Contact",
 )
 def physical(scene: Scene, arguments: Arguments) -> None:
@@ -43,6 +48,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
     where = arguments.last
     if prop.deforms:
         raise arguments.error(f"{prop.name} is deformed by key frames or by formula: it cannot be physical as well")
+    region = arguments.name("a region's name") if arguments.keyword("REGION") else None
     options = arguments.options(
         of=lambda: arguments.choice("a material", [name.upper() for name in MATERIALS]).lower(),
         law=lambda: arguments.choice("the law", _LAWS).lower(),
@@ -71,9 +77,30 @@ def physical(scene: Scene, arguments: Arguments) -> None:
             f"a wall must be thinner than half of {prop.name}, {0.5 * prop.thing.size.min():g} m", where
         )
     try:
-        scene.contact.physical[prop.name] = ObjectMaterial(**options, where=place(arguments))  # type: ignore[arg-type]
+        material = ObjectMaterial(**options, where=place(arguments))  # type: ignore[arg-type]
     except InputError as error:
         raise arguments.error(error.message, where) from None
+    known = scene.contact.physical.get(prop.name)
+    if region is not None:
+        material = _with_region(arguments, prop, known or ObjectMaterial(where=material.where), region, material)
+    elif known is not None:
+        material = replace(material, regions=known.regions)
+    scene.contact.physical[prop.name] = material
+
+
+def _with_region(
+    arguments: Arguments, prop: Prop, whole: ObjectMaterial, name: str, material: ObjectMaterial
+) -> ObjectMaterial:
+    """An object's material with another of one region of its volume file."""
+    known = [region for region in region_names(prop.thing) if region.lower() == name.lower()]
+    if not known:
+        names = region_names(prop.thing)
+        more = did_you_mean(name, names) or (f"; it has {', '.join(names)}" if names else ": it is from no volume file")
+        raise arguments.error(f"{prop.name} has no region {name}{more}")
+    if material.wall or material.pressure or material.element is not None:
+        raise arguments.error("HOLLOW, PRESSURE and ELEMENT are for an object as a whole, not for a region")
+    others = tuple(one for one in whole.regions if one[0] != known[0])
+    return replace(whole, regions=(*others, (known[0], material)))
 
 
 @command(

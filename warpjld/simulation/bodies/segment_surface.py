@@ -86,7 +86,9 @@ def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spaci
     skeleton, surface = rig.skeleton, rig.surface
     joints = {joint for name in segments for joint in segment_joints(skeleton, name)}
     words = {skeleton.names[joint] for joint in joints}
-    sides = [side for side in ("left", "right") if any(word.startswith(f"{side}.") and ".knuckle" in word for word in words)]
+    sides = [
+        side for side in ("left", "right") if any(word.startswith(f"{side}.") and ".knuckle" in word for word in words)
+    ]
     palms = {f"{side}.{part}" for side in sides for part in ("palm", "carpus")}
     mine = np.array([fan.name in words | palms for fan in covering.fans])
     inside = covering.domains[:, mine].sum(axis=1) > 0.5
