@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.geometry.paint import paint_by_parts
 from warpjld.grasp.objects import GraspObject, make_object
 from warpjld.io.mesh_file import read_mesh
 
@@ -62,6 +63,7 @@ def load_object(
     vertices = (UNITS[unit] * scale) * file.vertices @ AXES_TO_Y[up].T
     if centre:
         vertices -= (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+    corner_uv = file.uv[file.faces] if file.corner_uv is None and file.uv is not None else file.corner_uv
     try:
         return make_object(
             name or file.path.stem,
@@ -70,6 +72,7 @@ def load_object(
             parts=file.parts,
             polygons=file.polygons,
             origin=str(path),
+            paint=paint_by_parts(corner_uv, file.parts, len(file.faces)),
         )
     except InputError as error:
         raise InputError(error.message, path=path) from None

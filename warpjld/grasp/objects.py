@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.geometry.paint import SurfacePaint
 from warpjld.geometry.surface import Part, weld_surface
 from warpjld.grasp.feature_normals import face_normals
 from warpjld.grasp.validation import MeshReport, mend
@@ -100,6 +101,7 @@ class GraspObject:
         facets: Facet of the file, triangle or larger polygon, that every triangle is a part of, shape (t,); None where
             it is its row. People count facets so (R133); functions that take a triangle say so.
         cells: Its volume mesh, where its file has one.
+        paint: Textures of its triangles, where its file has any.
 
     Examples:
         >>> ball = wj.shapes.ball(0.065).placed((0.0, -0.05, -0.06))
@@ -118,6 +120,7 @@ class GraspObject:
     numbers: NDArray[np.int64] | None = None
     facets: NDArray[np.int64] | None = None
     cells: VolumeCells | None = None
+    paint: SurfacePaint | None = None
 
     def facet_of(self, triangle: int) -> int:
         """The file's number of the facet that a triangle is a part of."""
@@ -201,6 +204,7 @@ def make_object(
     parts: tuple[Part, ...] = (),
     polygons: NDArray[np.int64] | None = None,
     origin: str = "",
+    paint: SurfacePaint | None = None,
 ) -> GraspObject:
     """An object from arrays: welded, checked and mended (see ``report``).
 
@@ -211,6 +215,7 @@ def make_object(
         parts: Ranges that are welded each by itself.
         polygons: Polygon that each triangle is a part of, shape (t,), where there are larger ones.
         origin: Where it comes from.
+        paint: Textures of the triangles.
 
     Raises:
         InputError: Empty, not finite, wrong shapes, not manifold, or one-sided.
@@ -227,6 +232,11 @@ def make_object(
         mended = mend(surface.vertices, surface.faces)
     except InputError as error:
         raise InputError(f"object {name}: {error.message}", path=error.path) from None
+    kept = None
+    if paint is not None:
+        rows = surface.source_rows[mended.rows]
+        before = np.asarray(vertices, np.float64)[np.asarray(faces)[rows]]
+        kept = _kept_paint(paint, before, mended.vertices[mended.faces], rows)
     return GraspObject(
         name,
         mended.vertices,
@@ -235,4 +245,20 @@ def make_object(
         origin=origin,
         numbers=surface.numbers[mended.used],
         facets=surface.facets[mended.rows],
+        paint=kept,
     )
+
+
+def _kept_paint(
+    paint: SurfacePaint, before: NDArray[np.float64], now: NDArray[np.float64], rows: NDArray[np.int64]
+) -> SurfacePaint:
+    """Paint of the triangles that are left: mending turns some of them, so that corners are found by their places.
+
+    Args:
+        paint: Of all triangles.
+        before: Places of the corners of those that are left [m], shape (t, 3, 3).
+        now: The same as they are now.
+        rows: Their rows among all, shape (t,).
+    """
+    corner = np.linalg.norm(now[:, :, None] - before[:, None], axis=3).argmin(axis=2)
+    return SurfacePaint(paint.corner_uv[rows[:, None], corner], paint.image[rows], paint.images)

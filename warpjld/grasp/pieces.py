@@ -52,7 +52,7 @@ def cut_object(thing: GraspObject, count: int, axis: int) -> list[GraspObject]:
         piece = replace(
             thing, vertices=mended.vertices, faces=mended.faces, report=mended.report, origin=origin, numbers=None
         )
-        out.append(replace(piece, name=f"{thing.name}_{number}", facets=None, cells=None))
+        out.append(replace(piece, name=f"{thing.name}_{number}", facets=None, cells=None, paint=None))
     return out
 
 

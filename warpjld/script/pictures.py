@@ -133,6 +133,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Ite
             segments=_bones(crowd, film.style),
             solids=crowd.solids(),
             colors=crowd.colors,
+            texture=crowd.texture,
             lamps=lamps_at(scene, float(crowd.frames[0])),
             style=style_of(scene),
             quality=quality,
@@ -163,6 +164,7 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
         segments=_bones(crowd, picture.style),
         solids=now.solids(shift),
         colors=now.colors,
+        texture=now.texture,
         lamps=lamps_at(scene, picture.frame),
         style=style_of(scene),
     ) as stage_:

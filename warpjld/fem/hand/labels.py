@@ -16,6 +16,8 @@ _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": 
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
 _FOLDING = ("elbow", "knee")
 """Joints that fold so far that flesh on one side meets flesh on the other."""
+_CREASED = 0.4
+"""Width of the transition beside a crease, over that beside a phalanx: the crease itself is a line."""
 _BETWEEN = "middle"
 """Phalanx between a finger's first and last; a thumb has none."""
 WEB = ".web"
@@ -176,7 +178,7 @@ def fringes(
         mine, others = np.flatnonzero(label == a), np.flatnonzero(label == b)
         if len(mine) and len(others):
             away, _ = cKDTree(middle[others]).query(middle[mine])
-            out[mine] = np.minimum(out[mine], _grown(away / width))
+            out[mine] = np.minimum(out[mine], _grown(away / (_CREASED * width)))
     return out
 
 

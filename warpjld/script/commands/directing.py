@@ -74,7 +74,7 @@ def color(scene: Scene, arguments: Arguments) -> None:
     name = arguments.name("an actor's or an object's name").upper()
     chosen = read_color(arguments)
     if name in scene.props:
-        scene.props[name].color = chosen
+        scene.props[name].color, scene.props[name].colored = chosen, True
     elif name in scene.actors:
         scene.actors[name].color = chosen
     else:

@@ -90,7 +90,7 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     thing = thing.placed(cast(tuple, options.get("at", (0.0, 0.0, 0.0))), turn.as_quat())
     color = str(options.get("color", COLORS[len(scene.props) % len(COLORS)]))
     assumed = "m" if path is not None and shapes is None and "unit" not in options else None
-    scene.props[name] = Prop(name, thing, color, shapes=shapes, assumed=assumed)
+    scene.props[name] = Prop(name, thing, color, shapes=shapes, assumed=assumed, colored="color" in options)
     if path is not None:
         unit = None if shapes is not None else str(options.get("unit", "m"))
         hands = [length for actor in scene.actors.values() if (length := hand_length(actor.skeleton))]
