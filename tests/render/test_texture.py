@@ -17,6 +17,7 @@ from warpjld.grasp import load_object
 from warpjld.render import Camera, Quality, SceneRenderer, Solid
 from warpjld.render.texture import texture_atlas
 from warpjld.script import Interpreter, Scene
+from warpjld.script.pictures import style_of
 from warpjld.script.props import texture_of
 
 RED, BLUE = (220, 20, 20), (20, 20, 220)
@@ -128,3 +129,26 @@ def test_what_is_not_there_or_no_picture(tmp_path: Path) -> None:
         texture_of(scene.props["CUBE"])
     next(tmp_path.glob("*.png")).unlink()
     assert load_object(path).paint is None
+
+
+def test_a_picture_behind_everything(tmp_path: Path) -> None:
+    path = tmp_path / "sky.png"
+    picture().save(path)
+    scene = Scene(say=lambda text: None)
+    Interpreter(scene).run_text(f'BACKDROP PICTURE "{path}"')
+    thing = trimesh.creation.icosphere(radius=0.03)
+    solid = Solid(np.asarray(thing.vertices), np.asarray(thing.faces), color="#ffffff")
+    with SceneRenderer(
+        np.zeros((0, 3), int),
+        Camera((0.0, 0.0, 0.4), (0.0, 0.0, 0.0)),
+        size=(64, 64),
+        solids=[solid],
+        style=style_of(scene),
+    ) as stage:
+        drawn = stage.draw(np.zeros((0, 3)))
+    assert np.abs(drawn[4, 4].astype(int) - RED).max() < 3
+    assert np.abs(drawn[60, 60].astype(int) - BLUE).max() < 3
+    assert drawn[32, 32].min() > 90  # the ball is before it
+    path.write_bytes(b"none")
+    with pytest.raises(InputError, match="no picture that can be read"):
+        Interpreter(scene).run_text(f'BACKDROP PICTURE "{path}"')

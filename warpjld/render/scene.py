@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import unit
+from warpjld.render.backdrop import before_picture
 from warpjld.render.body import MATTE, SKIN, RenderedBody
 from warpjld.render.camera import Camera
 from warpjld.render.colors import ColorScale, as_hex
@@ -301,6 +302,9 @@ class SceneRenderer:
 
         self._plotter.render()
         picture = self._plotter.screenshot(return_img=True)
+        if self._style.picture is not None:
+            empty = np.isnan(self._plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False))
+            picture = before_picture(picture, empty, self._style.picture)
         times = self._quality.supersampling
         if times > 1:
             picture = np.asarray(Pictures.fromarray(picture).reduce(times))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -71,7 +72,8 @@ def lamps_at(scene: Scene, frame: float) -> list[render.Lamp]:
 
 def style_of(scene: Scene) -> render.Style:
     """Colours of a scene."""
-    return render.Style() if scene.backdrop is None else render.Style(background=scene.backdrop)
+    style = render.Style() if scene.backdrop is None else render.Style(background=scene.backdrop)
+    return replace(style, picture=scene.backdrop_picture)
 
 
 class FilmStudio:

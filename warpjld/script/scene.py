@@ -126,6 +126,7 @@ class Scene:
         size: Width and height of pictures and films [pixels].
         lamps: That stand on the stage, by name; none: studio light.
         backdrop: Colours behind everything, below and above.
+        backdrop_picture: File of a picture there instead.
         shots: Frames and their cameras, by name.
         outputs: Files to make, relative to the output folder.
         asked: Where in a script they were asked for, by name.
@@ -161,6 +162,7 @@ class Scene:
     size: tuple[int, int] = (960, 720)
     lamps: dict[str, KeyedLamp] = field(default_factory=dict)
     backdrop: tuple[str, str] | None = None
+    backdrop_picture: Path | None = None
     shots: dict[str, Shot] = field(default_factory=dict)
     outputs: list[Output] = field(default_factory=list)
     asked: dict[str, SourceLocation] = field(default_factory=dict)

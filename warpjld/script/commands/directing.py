@@ -53,12 +53,23 @@ def light(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "BACKDROP",
-    syntax='BACKDROP "<colour>" ["<colour above>"]',
-    help="What is behind everything: one colour, or one that goes over into another upwards.",
+    syntax='BACKDROP "<colour>" ["<colour above>"] or BACKDROP PICTURE "<picture file>"',
+    help="What is behind everything: one colour, one that goes over into another upwards, or a picture.",
     group="Output",
 )
 def backdrop(scene: Scene, arguments: Arguments) -> None:
     """What is behind everything (R135)."""
+    if arguments.keyword("PICTURE"):
+        from warpjld.render.backdrop import check_backdrop
+
+        path = arguments.input_file("a picture file")
+        try:
+            check_backdrop(path)
+        except InputError as error:
+            raise arguments.error(error.message) from None
+        scene.backdrop_picture = path
+        return
+    scene.backdrop_picture = None
     below = read_color(arguments)
     scene.backdrop = below, read_color(arguments) if arguments else below
 
