@@ -36,10 +36,7 @@ _LAWS = tuple(law.upper() for law in LAWS)
         f"PHYSICAL <object> [REGION <region>] [OF <material>] [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] "
         "[POISSON <ratio>] [DENSITY <kg/m³>] [HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
     ),
-    help=(
-        "An object deforms: OF what it is made, or law and moduli, of one REGION of its volume file; a wall makes it "
-        "hollow; its elements' size."
-    ),
+    help="An object deforms, or a REGION of its file: OF what it is made, or law and moduli; walls make it hollow.",
     group="Contact",
 )
 def physical(scene: Scene, arguments: Arguments) -> None:
@@ -109,10 +106,7 @@ def _with_region(
         "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM … or <segment> …] [ELEMENT <metres>] [YOUNG <pascals>] "
         "[SKIN <pascals>] [POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>] [FLEXION]"
     ),
-    help=(
-        "An actor's flesh deforms, of some digits or the palm, or of segments as left.forearm, only if named; ITSELF: "
-        "whether skin touches skin; FLEXION: bending alone deforms it, too."
-    ),
+    help="An actor's flesh deforms, only of digits, palm or segments that are named; FLEXION: by bending alone, too.",
     group="Contact",
 )
 def flesh(scene: Scene, arguments: Arguments) -> None:
