@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 SCRIPTS = [
     pytest.param(path.name, marks=pytest.mark.slow if path.name == "reach.jld" else ())
     for path in sorted(EXAMPLES.glob("*.jld"))
-    if not path.name.startswith(("press_", "hold_", "falls", "loads"))
+    if not path.name.startswith(("press_", "hold_", "flesh_", "cut_", "falls", "loads"))
 ]
 PRESSED = sorted(path.name for path in EXAMPLES.glob("press_*.jld"))
 
@@ -116,6 +116,35 @@ def test_loads_bend_bars(tmp_path) -> None:
     assert summary["press"]["status"] == "CONVERGED"
     assert summary["notes"] == []
     assert (tmp_path / "loads.png").stat().st_size > 1000
+
+
+def test_a_bar_in_pieces_parts(tmp_path) -> None:
+    summary = run_small("cut_bar.jld", tmp_path)
+    assert summary["press"]["status"] == "CONVERGED"
+    assert sorted(summary["notes"]) == [f"BAR_{one} and BAR_2 part between frames 1 and 2 wholly" for one in (1, 3)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["flesh_pads.jld", "flesh_palms.jld", "flesh_handshake.jld"])
+def test_flesh_of_two_actors(name: str, tmp_path) -> None:
+    """Both hands press, each on the other, with forces that sum to nothing (R126)."""
+    summary = run_small(name, tmp_path)
+    assert summary["press"]["status"] == "CONVERGED"
+    rows = list(csv.DictReader((tmp_path / "contact.csv").open(encoding="utf-8")))
+    last = [row for row in rows if row["frame"] == rows[-1]["frame"]]
+    forces: dict[str, np.ndarray] = {}
+    for row in last:
+        force = np.array([float(row[f"f{axis}_n"]) for axis in "xyz"])
+        forces[row["actor"]] = forces.get(row["actor"], np.zeros(3)) + force
+    one, other = forces.values()
+    assert np.linalg.norm(one) > 0.1
+    assert np.linalg.norm(one + other) < 1e-5 * np.linalg.norm(one)  # the table has six digits
+
+
+@pytest.mark.slow
+def test_an_arm_of_flesh_bends(tmp_path) -> None:
+    summary = run_small("flesh_elbow.jld", tmp_path)
+    assert summary["press"]["status"] == "CONVERGED"
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,11 +18,13 @@ _SEAM = 1e-6  # relative to the surface's size: border vertices of two parts nea
 
 @dataclass(frozen=True)
 class Part:
-    """One mesh of the source file: a range of source vertices and source faces."""
+    """One mesh of the source file: a range of source vertices and source faces, and its base colour texture, a picture
+    as its file holds it."""
 
     name: str
     vertices: slice
     faces: slice
+    texture: bytes | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

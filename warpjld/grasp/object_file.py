@@ -8,19 +8,21 @@ from typing import Literal
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.geometry.paint import paint_by_parts
 from warpjld.grasp.objects import GraspObject, make_object
 from warpjld.io.mesh_file import read_mesh
 
-__all__ = ["UNITS", "load_object"]
+__all__ = ["AXES_TO_Y", "UNITS", "load_object"]
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres per unit of a file."""
 
-_TURNS = {
+AXES_TO_Y = {
     "y": np.eye(3),
     "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
     "x": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
 }
+"""Rotation that takes a file's axis which points up to Y."""
 
 
 def load_object(
@@ -55,14 +57,15 @@ def load_object(
     """
     if unit not in UNITS:
         raise InputError(f"unit: want one of {', '.join(UNITS)}, got '{unit}'")
-    if up not in _TURNS:
+    if up not in AXES_TO_Y:
         raise InputError(f"up: want x, y or z, got '{up}'")
     if not (np.isfinite(scale) and scale > 0.0):
         raise InputError(f"scale: want a number above 0, got {scale:g}")
     file = read_mesh(path)
-    vertices = (UNITS[unit] * scale) * file.vertices @ _TURNS[up].T
+    vertices = (UNITS[unit] * scale) * file.vertices @ AXES_TO_Y[up].T
     if centre:
         vertices -= (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+    corner_uv = file.uv[file.faces] if file.corner_uv is None and file.uv is not None else file.corner_uv
     try:
         return make_object(
             name or file.path.stem,
@@ -71,6 +74,7 @@ def load_object(
             parts=file.parts,
             polygons=file.polygons,
             origin=str(path),
+            paint=paint_by_parts(corner_uv, file.parts, len(file.faces)),
         )
     except InputError as error:
         raise InputError(error.message, path=path) from None

@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.geometry.paint import SurfacePaint
 from warpjld.geometry.surface import Part, weld_surface
 from warpjld.grasp.feature_normals import face_normals
 from warpjld.grasp.validation import MeshReport, mend
 
-__all__ = ["GraspObject", "Places", "make_object"]
+__all__ = ["GraspObject", "Places", "VolumeCells", "make_object"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,23 @@ class Places:
 
 
 @dataclass(frozen=True, eq=False)
+class VolumeCells:
+    """The volume mesh of an object, from a file.
+
+    Attributes:
+        nodes: In the object's frame [m], shape (N, 3).
+        elements: Hexahedra, prisms and tetrahedra as degenerate ones among them, shape (E, 8).
+        regions: Region of each, shape (E,).
+        region_names: Of the regions.
+    """
+
+    nodes: NDArray[np.float64]
+    elements: NDArray[np.int32]
+    regions: NDArray[np.int32]
+    region_names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class GraspObject:
     """A rigid object.
 
@@ -84,6 +102,8 @@ class GraspObject:
         numbers: Index of every vertex in the file, shape (n,); None where it is the row.
         facets: Facet of the file (triangle or larger polygon) that every triangle is a part of, shape (t,); None where
             it is the row. Commands number facets as the file does (R133); functions that take a triangle say so.
+        cells: Volume mesh of its file, if it has one.
+        paint: Textures of its triangles, if its file has any.
 
     Examples:
         >>> ball = wj.shapes.ball(0.065).placed((0.0, -0.05, -0.06))
@@ -101,6 +121,8 @@ class GraspObject:
     origin: str = ""
     numbers: NDArray[np.int64] | None = None
     facets: NDArray[np.int64] | None = None
+    cells: VolumeCells | None = None
+    paint: SurfacePaint | None = None
 
     def facet_of(self, triangle: int) -> int:
         """Number, in the file, of the facet that a triangle is a part of."""
@@ -136,7 +158,8 @@ class GraspObject:
         """
         if not (np.isfinite(factor) and factor > 0.0):
             raise InputError(f"scale: want a number above 0, got {factor:g}")
-        return replace(self, vertices=self.vertices * factor)
+        cells = None if self.cells is None else replace(self.cells, nodes=self.cells.nodes * factor)
+        return replace(self, vertices=self.vertices * factor, cells=cells)
 
     def check_facet(self, facet: int) -> int:
         """The row of a triangle.
@@ -188,6 +211,7 @@ def make_object(
     parts: tuple[Part, ...] = (),
     polygons: NDArray[np.int64] | None = None,
     origin: str = "",
+    paint: SurfacePaint | None = None,
 ) -> GraspObject:
     """Make an object from arrays; vertices are welded, the surface is checked and repaired (see ``report``).
 
@@ -198,6 +222,7 @@ def make_object(
         parts: Ranges of vertices and faces that are welded separately.
         polygons: Polygon that each triangle is a part of, shape (t,), where the file has larger polygons.
         origin: File or built-in shape it comes from.
+        paint: Textures of the triangles.
 
     Raises:
         InputError: Empty, not finite, wrong shapes, or one-sided.
@@ -214,6 +239,11 @@ def make_object(
         mended = mend(surface.vertices, surface.faces)
     except InputError as error:
         raise InputError(f"object {name}: {error.message}", path=error.path) from None
+    kept = None
+    if paint is not None:
+        rows = surface.source_rows[mended.rows]
+        before = np.asarray(vertices, np.float64)[np.asarray(faces)[rows]]
+        kept = _kept_paint(paint, before, mended.vertices[mended.faces], rows)
     return GraspObject(
         name,
         mended.vertices,
@@ -222,4 +252,20 @@ def make_object(
         origin=origin,
         numbers=surface.numbers[mended.used],
         facets=surface.facets[mended.rows],
+        paint=kept,
     )
+
+
+def _kept_paint(
+    paint: SurfacePaint, before: NDArray[np.float64], now: NDArray[np.float64], rows: NDArray[np.int64]
+) -> SurfacePaint:
+    """Paint of the triangles that are left: mending turns some of them, so that corners are found by their places.
+
+    Args:
+        paint: Of all triangles.
+        before: Places of the corners of those that are left [m], shape (t, 3, 3).
+        now: The same as they are now.
+        rows: Their rows among all, shape (t,).
+    """
+    corner = np.linalg.norm(now[:, :, None] - before[:, None], axis=3).argmin(axis=2)
+    return SurfacePaint(paint.corner_uv[rows[:, None], corner], paint.image[rows], paint.images)

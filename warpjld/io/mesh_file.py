@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from warpjld.files.input_file import check_input
 from warpjld.files.reading import reading
 from warpjld.geometry.surface import Part, one_uv_a_vertex
 from warpjld.io.obj_file import read_obj
+from warpjld.io.obj_material import obj_texture
 from warpjld.io.off_file import read_off
 from warpjld.io.ply_file import PlyFile, read_ply
 from warpjld.io.polygons import triangulate_polygons
@@ -74,7 +75,10 @@ def read_mesh(path: str | Path) -> MeshFile:
 def _obj(path: Path) -> MeshFile:
     file = read_obj(path)
     uv, corner_uv = one_uv_a_vertex(len(file.vertices), file.faces, file.corner_uv)
-    return MeshFile(path, file.vertices, file.faces, uv, corner_uv, file.parts, file.notes, file.polygons)
+    picture, note = obj_texture(path) if file.corner_uv is not None else (None, "")
+    parts = tuple(replace(part, texture=picture) for part in file.parts)
+    notes = (*file.notes, *([note] if note else []))
+    return MeshFile(path, file.vertices, file.faces, uv, corner_uv, parts, notes, file.polygons)
 
 
 def _gltf(path: Path) -> MeshFile:

@@ -29,6 +29,7 @@ class RigMesh:
         corner_uv: Texture coordinates of the triangles' corners, if a vertex has several, shape (S, 3, 2), or None.
         polygons: Polygon that each triangle is part of, shape (S,), or None if all polygons are triangles.
         polygon_count: Number of polygons in the file, including those without triangles.
+        texture: Picture of its base colour, as its file holds it.
     """
 
     name: str
@@ -41,6 +42,7 @@ class RigMesh:
     corner_uv: NDArray[np.float32] | None = None
     polygons: NDArray[np.int64] | None = None
     polygon_count: int = 0
+    texture: bytes | None = None
 
 
 def joined(meshes: Sequence[RigMesh]) -> dict[str, Any]:
@@ -65,7 +67,12 @@ def joined(meshes: Sequence[RigMesh]) -> dict[str, Any]:
         "uv": uv,
         "corner_uv": corner_uv,
         "parts": tuple(
-            Part(mesh.name, slice(int(vertex[m]), int(vertex[m + 1])), slice(int(face[m]), int(face[m + 1])))
+            Part(
+                mesh.name,
+                slice(int(vertex[m]), int(vertex[m + 1])),
+                slice(int(face[m]), int(face[m + 1])),
+                mesh.texture,
+            )
             for m, mesh in enumerate(meshes)
         ),
         "polygons": None if all(mesh.polygons is None for mesh in meshes) else np.concatenate(polygons),

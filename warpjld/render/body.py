@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.render.creases import Shading
+from warpjld.render.texture import MeshTexture
 
 __all__ = ["MATTE", "SKIN", "RenderedBody"]
 
@@ -33,6 +34,7 @@ class RenderedBody:
         self._mesh = pyvista.PolyData.from_regular_faces(points, self._shading.faces)
         self._mesh.point_data["Normals"] = normals
         self._mesh.point_data.active_normals_name = "Normals"
+        self._copies: NDArray[np.int64] | None = None
 
     def show(self, plotter: Any, color: str | NDArray[np.uint8], **look: Any) -> None:
         """Add the mesh to a plotter.
@@ -64,9 +66,28 @@ class RenderedBody:
         actor = plotter.add_mesh(self._mesh, smooth_shading=False, scalars="colors", rgb=True, **look)
         actor.prop.interpolation = "Phong"
 
+    def show_textured(self, plotter: Any, texture: MeshTexture, **look: Any) -> None:
+        """Add it with a picture on it."""
+        import pyvista
+
+        keyed = np.column_stack([self._shading.faces.ravel(), texture.corner_uv.reshape(-1, 2)])
+        kinds, corner = np.unique(keyed, axis=0, return_inverse=True)
+        self._copies = kinds[:, 0].astype(np.int64)
+        faces, normals = corner.reshape(-1, 3).astype(np.int32), self._mesh.point_data["Normals"][self._copies]
+        self._mesh = pyvista.PolyData.from_regular_faces(np.asarray(self._mesh.points)[self._copies], faces)
+        self._mesh.point_data["Normals"] = normals
+        self._mesh.point_data.active_normals_name = "Normals"
+        self._mesh.active_texture_coordinates = kinds[:, 1:].astype(np.float32)
+        picture = pyvista.Texture(np.ascontiguousarray(texture.image))
+        actor = plotter.add_mesh(self._mesh, smooth_shading=False, texture=picture, color="white", **look)
+        actor.prop.interpolation = "Phong"
+
     def place(self, vertices: NDArray[np.floating]) -> None:
         """Move the vertices to positions [m], shape (n, 3)."""
-        self._mesh.points, self._mesh.point_data["Normals"] = self._shading.place(vertices)
+        points, normals = self._shading.place(vertices)
+        if self._copies is not None:
+            points, normals = points[self._copies], normals[self._copies]
+        self._mesh.points, self._mesh.point_data["Normals"] = points, normals
 
     @property
     def corners(self) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import unit
+from warpjld.render.backdrop import before_picture
 from warpjld.render.body import MATTE, SKIN, RenderedBody
 from warpjld.render.camera import Camera
 from warpjld.render.colors import ColorScale, as_hex
@@ -19,6 +20,7 @@ from warpjld.render.lights import Lamp, add_lights, place_lamps
 from warpjld.render.occlusion import occlusion, shade
 from warpjld.render.skeleton import bone_faces, bone_vertices, joint_faces, joint_vertices
 from warpjld.render.style import Quality, Style
+from warpjld.render.texture import MeshTexture
 from warpjld.render.wires import Wires
 
 __all__ = ["Image", "Look", "SceneRenderer", "Solid"]
@@ -45,12 +47,14 @@ class Solid:
         faces: Triangles, shape (t, 3).
         color: Name or ``#rrggbb``, see `as_hex`.
         opacity: 0…1.
+        texture: Picture on it instead of the colour.
     """
 
     vertices: ArrayLike
     faces: ArrayLike
     color: str = "#7fa3b8"
     opacity: float = 1.0
+    texture: MeshTexture | None = None
 
     def __post_init__(self) -> None:
         as_hex(self.color)
@@ -69,6 +73,7 @@ class SceneRenderer:
         solids: Other objects.
         scale: Colours for the values that come with each frame.
         colors: Colours of the vertices instead of the style's, uint8 (V, 3).
+        texture: Picture on the surface instead of colours.
         lamps: On the stage, instead of studio light.
         style: Colours.
         quality: Effort.
@@ -88,11 +93,12 @@ class SceneRenderer:
         solids: Sequence[Solid] = (),
         scale: ColorScale | None = None,
         colors: NDArray[np.uint8] | None = None,
+        texture: MeshTexture | None = None,
         lamps: Sequence[Lamp] = (),
         style: Style | None = None,
         quality: Quality | None = None,
     ) -> None:
-        self._colors, self._lamps = colors, tuple(lamps)
+        self._colors, self._texture, self._lamps = colors, texture, tuple(lamps)
         self._faces = np.asarray(faces)
         if self._faces.ndim != 2 or self._faces.shape[1] != 3 or (len(self._faces) == 0 and not solids):
             raise InputError(f"faces: want shape (n, 3) with n > 0, got {self._faces.shape}")
@@ -244,7 +250,9 @@ class SceneRenderer:
             color = self._scale.table() if self._scale else style.skin
             look: dict[str, Any] = {"opacity": opacity, "culling": culling}
             look |= MATTE if self._wire or self._scale else SKIN
-            if self._colors is not None and not self._scale and not self._wire:
+            if self._texture is not None and not self._scale and not self._wire:
+                self._skin.show_textured(self._plotter, self._texture, **look)
+            elif self._colors is not None and not self._scale and not self._wire:
                 self._skin.show_painted(self._plotter, self._colors, **look)
             else:
                 self._skin.show(self._plotter, color, **look)
@@ -268,7 +276,10 @@ class SceneRenderer:
             RenderedBody(np.asarray(s.vertices, float), np.asarray(s.faces), _SOLID_CREASE) for s in self._solids
         ]
         for solid, body in zip(self._solids, self._bodies, strict=True):
-            body.show(self._plotter, solid.color, opacity=solid.opacity, **SKIN)
+            if solid.texture is not None:
+                body.show_textured(self._plotter, solid.texture, opacity=solid.opacity, **SKIN)
+            else:
+                body.show(self._plotter, solid.color, opacity=solid.opacity, **SKIN)
         self._extent, self._occluded = extent, self._quality.occlusion and not self._wire and opacity == 1
         self._aim()
 
@@ -291,6 +302,9 @@ class SceneRenderer:
 
         self._plotter.render()
         picture = self._plotter.screenshot(return_img=True)
+        if self._style.picture is not None:
+            empty = np.isnan(self._plotter.get_image_depth(fill_value=np.nan, reset_camera_clipping_range=False))
+            picture = before_picture(picture, empty, self._style.picture)
         times = self._quality.supersampling
         if times > 1:
             picture = np.asarray(Pictures.fromarray(picture).reduce(times))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from warpjld.errors import InputError
 
@@ -51,6 +52,7 @@ class Style:
         joint: Its joints.
         ink: Captions.
         colormap: Name of a Matplotlib colour map for values.
+        picture: File of a picture behind everything, which fills the view; None for the background's colours.
     """
 
     skin: str = "#f0bda4"
@@ -63,3 +65,4 @@ class Style:
     joint: str = "#d1495b"
     ink: str = "#2b2f36"
     colormap: str = "viridis"
+    picture: Path | None = None

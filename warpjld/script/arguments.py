@@ -221,6 +221,11 @@ class Arguments:
         self._next += 1
         return value.text
 
+    def next_word(self) -> str | None:
+        """The word or quoted text that comes next, which is not read; None where none does."""
+        value = self._peek()
+        return value.text if isinstance(value, Word | Text) else None
+
     def new_name(self, what: str) -> str:
         """Read the name of something new; as ``name``, but it must also be usable as a file name."""
         name = self.name(what)

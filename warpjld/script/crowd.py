@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpjld.geometry.paint import paint_of_surface
 from warpjld.render.style import Style
 from warpjld.script.directing import camera_at
 from warpjld.script.outermost import outermost
 from warpjld.script.outputs import CameraSetting
-from warpjld.script.props import Prop
+from warpjld.script.props import Prop, texture_of
 from warpjld.script.scene import Actor
 from warpjld.script.staging import stage, staged
 from warpjld.skeleton import Poses, Skeleton
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from warpjld.grasp import Places
     from warpjld.render import Camera as RenderCamera
     from warpjld.render import Solid
+    from warpjld.render.texture import MeshTexture
     from warpjld.simulation.display.surfaces import DeformedSurfaces
     from warpjld.touch.contact import SkinContact
 
@@ -125,7 +127,7 @@ class Crowd:
         from warpjld.render import Solid
 
         return [
-            Solid(vertices, prop.thing.faces, color=prop.color)
+            Solid(vertices, prop.thing.faces, color=prop.color, texture=texture_of(prop))
             for prop, vertices in zip(self.props, self.solid_vertices(0, shift), strict=True)
         ]
 
@@ -217,6 +219,21 @@ class Crowd:
             for role in self.roles
         ]
         return np.concatenate(rows).astype(np.uint8)
+
+    @cached_property
+    def texture(self) -> MeshTexture | None:
+        """Textures of all actors that were given no colour; None where there is none."""
+        from PIL import ImageColor
+
+        from warpjld.render.texture import texture_atlas
+
+        covers = []
+        for role in self.roles:
+            surface, color = role.covering.surface, role.actor.color
+            paint = paint_of_surface(surface) if color is None else None
+            red, green, blue = ImageColor.getrgb(color or Style().skin)[:3]
+            covers.append((paint, len(surface.faces), (red, green, blue)))
+        return texture_atlas(covers)
 
     def camera(self, camera: CameraSetting, size: tuple[int, int], frame: float | None = None) -> RenderCamera:
         """Render camera of a setting at a frame (the first one if left out).

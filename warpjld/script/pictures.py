@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -71,7 +72,8 @@ def lamps_at(scene: Scene, frame: float) -> list[render.Lamp]:
 
 def style_of(scene: Scene) -> render.Style:
     """Rendering style of a scene."""
-    return render.Style() if scene.backdrop is None else render.Style(background=scene.backdrop)
+    style = render.Style() if scene.backdrop is None else render.Style(background=scene.backdrop)
+    return replace(style, picture=scene.backdrop_picture)
 
 
 class FilmStudio:
@@ -133,6 +135,7 @@ def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Ite
             segments=_bones(crowd, film.style),
             solids=crowd.solids(),
             colors=crowd.colors,
+            texture=crowd.texture,
             lamps=lamps_at(scene, float(crowd.frames[0])),
             style=style_of(scene),
             quality=quality,
@@ -163,6 +166,7 @@ def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> No
         segments=_bones(crowd, picture.style),
         solids=now.solids(shift),
         colors=now.colors,
+        texture=now.texture,
         lamps=lamps_at(scene, picture.frame),
         style=style_of(scene),
     ) as stage_:

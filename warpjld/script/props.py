@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     from warpjld.fem.contact.obstacles.obstacle import RigidMotion
     from warpjld.geometry.surface import Surface
     from warpjld.grasp.keyframes import KeyframedShape
+    from warpjld.render.texture import MeshTexture
     from warpjld.script.scene import Actor
     from warpjld.simulation.state_variables import BarrKeys
 
-__all__ = ["COLORS", "Prop", "prop_places", "prop_surface"]
+__all__ = ["COLORS", "Prop", "prop_places", "prop_surface", "texture_of"]
 
 COLORS = ("#7fa3b8", "#c98b5a", "#8fae7c", "#b58bb0", "#c9b458", "#8a8f98")
 """Default colours of objects, used in turn."""
@@ -42,6 +43,7 @@ class Prop:
         shapes: Key-framed shapes, where it has them.
         barred: Keys of Barr's deformations (taper, twist, bend), where it has them.
         assumed: Unit that was assumed for its file because the script states none.
+        colored: Whether the script gave it a colour, which replaces the texture of its file.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Prop:
     shapes: KeyframedShape | None = None
     barred: BarrKeys | None = None
     assumed: str | None = None
+    colored: bool = False
 
     @property
     def deforms(self) -> bool:
@@ -108,6 +111,17 @@ def prop_places(actors: Mapping[str, Actor], rate: float, prop: Prop, frames: ND
 
     places = carried(prop.thing.place, prop.associations, frames, basis)
     return prop.placement.apply_to_places(places, frames)
+
+
+def texture_of(prop: Prop) -> MeshTexture | None:
+    """The texture of an object's file, unless it was given a colour."""
+    from PIL import ImageColor
+
+    from warpjld.render.texture import texture_atlas
+
+    red, green, blue = ImageColor.getrgb(prop.color)[:3]
+    paint = None if prop.colored else prop.thing.paint
+    return texture_atlas([(paint, len(prop.thing.faces), (red, green, blue))])
 
 
 def prop_surface(prop: Prop) -> Surface:

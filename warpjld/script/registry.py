@@ -75,6 +75,7 @@ _BUILT_IN = (
     "grasping",
     "reaching",
     "physical",
+    "pieces",
     "deforming",
     "loading",
     "gripping",

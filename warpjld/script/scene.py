@@ -125,6 +125,7 @@ class Scene:
         size: Width and height of pictures and films [pixels].
         lamps: Lamps by name; none: default lighting.
         backdrop: Background colours, below and above; None: default.
+        backdrop_picture: Picture file as background instead.
         shots: Shots by name.
         outputs: Files to make, relative to the output folder.
         asked: Position in a script of the command that added each output, by the output's name.
@@ -161,6 +162,7 @@ class Scene:
     size: tuple[int, int] = (960, 720)
     lamps: dict[str, KeyedLamp] = field(default_factory=dict)
     backdrop: tuple[str, str] | None = None
+    backdrop_picture: Path | None = None
     shots: dict[str, Shot] = field(default_factory=dict)
     outputs: list[Output] = field(default_factory=list)
     asked: dict[str, SourceLocation] = field(default_factory=dict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -37,6 +38,7 @@ class ObjectMaterial:
         made_of: Name in the catalogue of materials, if it is from there; determines its friction coefficients.
         prestress: Initial Cauchy stress in the object's axes, xx yy zz xy yz zx [Pa] (R98); relaxes where the object
             is not constrained.
+        regions: Materials of regions of its volume file, by name; the others have the object's (R141).
         where: Script location, for messages.
 
     Examples:
@@ -55,6 +57,7 @@ class ObjectMaterial:
     where: SourceLocation | None = None
     prestress: tuple[float, ...] = (0.0,) * 6
     made_of: str | None = None
+    regions: tuple[tuple[str, ObjectMaterial], ...] = ()
 
     def __post_init__(self) -> None:
         self.material()
@@ -66,6 +69,13 @@ class ObjectMaterial:
             raise InputError(f"pressure: want a finite pressure in Pa, got {self.pressure:g}")
         if self.pressure and not self.wall:
             raise InputError("pressure: only a hollow object has an inside to put under pressure")
+
+    def laws(self, name: str, regions: Sequence[str]) -> dict[str, Material]:
+        """Laws of the regions of its mesh, which are called ``name.region``, or ``name`` where there is only one."""
+        own, material = dict(self.regions), self.material()
+        if len(regions) < 2:
+            return {name: own[regions[0]].material() if regions and regions[0] in own else material}
+        return {f"{name}.{region}": own[region].material() if region in own else material for region in regions}
 
     def material(self) -> Material:
         """Constitutive law with its constants.

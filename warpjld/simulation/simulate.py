@@ -40,6 +40,7 @@ from warpjld.simulation.display.visible_pressure import VisiblePressure
 from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.find import FoundGrip
+from warpjld.simulation.report.parted import parted_notes
 from warpjld.simulation.report.table import ContactRow, ContactTable
 from warpjld.simulation.report.tactile import Tactile, tactile_readings
 from warpjld.simulation.report.verdict import ContactVerdict, verdict_of
@@ -340,6 +341,7 @@ def _report(
     if solved.resumed:
         notes.append(f"{solved.resumed} of {len(solved.frames)} frames were in {request.state} already")
     notes += [missed.text for missed in solved.missed]
+    notes += parted_notes(model, solved.frames, solved.start)
     if solved.frames:
         notes += visible_overlap_notes(surfaces, solved.frames[-1].frame)
     return Simulation(solved, surfaces, table.rows, verdict, notes)

@@ -216,7 +216,7 @@ class _Run:
         self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, bare)
         self.missed += missed_contacts(model, self.done[-1] if self.done else None, solution.instants)
         self.last = solution
-        self._add(solved_frame(float(frame), solution.instants))
+        self._add(solved_frame(float(frame), solution.instants, solution.states))
         if all(grip.first != frame for grip in self.contact.grips):  # otherwise after the grip search
             self._settle()
         return None

@@ -43,6 +43,8 @@ class FleshMaterial:
     Attributes:
         digits: Digits whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand. The thumb includes
             its ball (thenar).
+        segments: Segments of a body whose flesh is meshed, as ``left.forearm`` (see ``segment_joints``).
+        flexion: Whether bending alone deforms it from the first frame on, before any contact (B §1).
         element: Edge length of the elements [m].
         flesh: Young's modulus of the tissue between skin and bone [Pa]; default: subcutaneous tissue (Maeno 1998).
         skin: Young's modulus of the outermost layer of elements [Pa]; default: dermis (Maeno 1998).
@@ -57,6 +59,8 @@ class FleshMaterial:
     """
 
     digits: tuple[str, ...] = ()
+    segments: tuple[str, ...] = ()
+    flexion: bool = False
     element: float = 0.003
     flesh: float = 34e3
     skin: float = 80e3
@@ -72,6 +76,7 @@ class FleshMaterial:
         _want(self.stiffening >= 0.0, "stiffening", "an exponent of 0 or more", self.stiffening)
         unknown = [digit for digit in self.digits if digit not in (*DIGITS, "palm")]
         _want(not unknown, "digits", f"of {', '.join(DIGITS)} and palm", unknown)
+        _want(not (self.digits and self.segments), "segments", "digits or segments, not both", self.segments)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from warpjld.errors import InputError
 from warpjld.fem.contact.interface.pairs import Exclusion
 from warpjld.fem.flesh import Flesh, flesh_of
 from warpjld.fem.hand.blend import Moves, moves_of
-from warpjld.fem.hand.labels import WEB, excluded_pairs, fringes, joined_pairs, segment_name, skin_labels
+from warpjld.fem.hand.labels import WEB, creases, excluded_pairs, fringes, joined_pairs, segment_name, skin_labels
 from warpjld.fem.hand.regions import hand_regions
 from warpjld.fem.hand.weights import bone_weights
 from warpjld.fem.load.prescribed import Prescribed
@@ -81,7 +81,9 @@ class FleshHand:
 
     def self_contact(self) -> Exclusion:
         """Parts of the skin that are excluded from self-contact (R126, R127)."""
-        labels, joined = self.skin_labels, joined_pairs(self.label_names)
+        names = self.skeleton.names
+        ends = [[names[joint] for joint in joints] for joints in (self.flesh.bones, self.flesh.parents)]
+        labels, joined = self.skin_labels, joined_pairs(self.label_names, *ends)
         return Exclusion(labels, labels, self.excluded, joined, self.skin_fringes)
 
     def moves(self, poses: Poses, frame: int = 0) -> Moves:
@@ -202,7 +204,9 @@ def build_flesh_hand(
     mesh = replace(mesh, regions=regions, region_names=region_names, faces={name: faces})
     flesh = replace(flesh, mesh=mesh)
     labels, names = skin_labels(mesh, faces, weights, joints, apart * spacing)
-    excluded = excluded_pairs(mesh, faces, labels, names, 0.5 * apart * spacing)
+    parents = [rig.skeleton.names[j] for j in flesh.parents]
+    joined, folds = joined_pairs(names, joints, parents), creases(names, joints, parents)
+    excluded = excluded_pairs(mesh, faces, labels, names, 0.5 * apart * spacing, joined, folds)
     place = Moves(np.tile([0.0, 0.0, 0.0, 1.0], (len(joints), 1)), np.zeros((len(joints), 3)))
-    fringe = fringes(mesh, faces, labels, names, apart * spacing)
+    fringe = fringes(mesh, faces, labels, names, apart * spacing, folds)
     return FleshHand(name, flesh, rig.skeleton, rig.surface, place, weights, faces, labels, names, excluded, fringe)

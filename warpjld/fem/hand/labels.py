@@ -10,12 +10,16 @@ from numpy.typing import NDArray
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.skeleton.hand import DIGITS
 
-__all__ = ["WEB", "excluded_pairs", "fringes", "joined_pairs", "segment_name", "skin_labels"]
+__all__ = ["WEB", "creases", "excluded_pairs", "fringes", "joined_pairs", "segment_name", "skin_labels"]
 
 _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": "palm", "carpometacarpal": "wrist"}
 """Segment that ends at a finger's joint."""
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
 """Segment that ends at a thumb's joint."""
+_FOLDING = ("elbow", "knee")
+"""Joints that fold so far that flesh on both sides comes into contact."""
+_CREASED = 0.4
+"""Width of the transition at a crease, relative to that beside a phalanx: a crease is a line."""
 _BETWEEN = "middle"
 """Phalanx between a finger's first and last; a thumb has none."""
 WEB = ".web"
@@ -92,34 +96,75 @@ def _reordered(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[
     return rank[label], tuple(names[k] for k in order)
 
 
-def joined_pairs(names: Sequence[str]) -> NDArray[np.bool_]:
+def creases(names: Sequence[str], joints: Sequence[str], parents: Sequence[str]) -> NDArray[np.bool_]:
+    """Pairs of labels that a limb folds between: upper arm and forearm, thigh and shin, symmetric, shape (L, L).
+
+    Args:
+        names: Of the labels.
+        joints: Distal joint of each bone.
+        parents: Proximal joint of each bone.
+    """
+    out = np.zeros((len(names), len(names)), dtype=bool)
+    ends = {segment_name(joint): (joint, parent) for joint, parent in zip(joints, parents, strict=True)}
+    for a, one in enumerate(names):
+        for b, other in enumerate(names):
+            if one in ends and other in ends and ends[one][0] == ends[other][1]:
+                out[a, b] |= ends[one][0].rpartition(".")[2] in _FOLDING
+    return out | out.T
+
+
+def joined_pairs(names: Sequence[str], joints: Sequence[str], parents: Sequence[str]) -> NDArray[np.bool_]:
     """Pairs of labels that belong together, symmetric, shape (L, L).
 
     These are: a label with itself; segments of one digit; a first phalanx and its metacarpal; parts of the palm and the
-    wrist.
+    wrist; segments of a body that share a joint.
+
+    Args:
+        names: Of the labels.
+        joints: Distal joint of each bone.
+        parents: Proximal joint of each bone.
     """
     count = len(names)
     out = np.eye(count, dtype=bool)
+    ends: dict[str, set[str]] = {}
+    for joint, parent in zip(joints, parents, strict=True):
+        ends.setdefault(segment_name(joint), set()).update((joint, parent))
     for a in range(count):
         for b in range(a):
-            joined = _base_of(names[a], names[b]) or _base_of(names[b], names[a])
-            out[a, b] = out[b, a] = _digit(names[a]) == _digit(names[b]) or joined
+            one, other = names[a], names[b]
+            joined = _base_of(one, other) or _base_of(other, one) or (_digit(one) == _digit(other) != "")
+            if not joined and _digit(one) == _digit(other) == "":
+                joined = (_palmar(one) and _palmar(other)) or bool(ends.get(one, set()) & ends.get(other, set()))
+            out[a, b] = out[b, a] = joined
     return out
 
 
-def fringes(
-    mesh: HexMesh, faces: NDArray[np.int32], label: NDArray[np.int32], names: Sequence[str], width: float
-) -> NDArray[np.float64]:
-    """Contact factor between faces of a finger's first and last phalanx, shape (F,).
+def _palmar(name: str) -> bool:
+    """Whether a label belongs to a palm and its wrist."""
+    words = name.removesuffix(WEB).split(".")
+    return "palm" in words or words[-1] in ("wrist", "forearm")
 
-    It is 0 at the border to the phalanx between them, which is excluded from contact with both, and grows from there.
+
+def fringes(
+    mesh: HexMesh,
+    faces: NDArray[np.int32],
+    label: NDArray[np.int32],
+    names: Sequence[str],
+    width: float,
+    folds: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Contact factor between faces of a finger's first and last phalanx, and on either side of a crease, shape (F,).
+
+    It is 0 at the border to the phalanx between them, which is excluded from contact with both, or to the other side,
+    and grows from there.
 
     Args:
         mesh: Mesh at rest.
         faces: Skin faces, shape (F, 2).
         label: Their labels, shape (F,).
         names: Names of the labels.
-        width: Width of the transition [m]: the factor is 0 up to half a width from that phalanx, 1 from 1.5 widths.
+        width: Width of the transition [m]: the factor is 0 up to half a width from that border, 1 from 1.5 widths.
+        folds: Pairs of labels that a limb folds between, shape (L, L).
     """
     from scipy.spatial import cKDTree
 
@@ -130,18 +175,35 @@ def fringes(
     for own in set(digit[between].tolist()):
         mine = np.flatnonzero((digit == own) & ~between)
         away, _ = cKDTree(middle[between & (digit == own)]).query(middle[mine])
-        t = np.clip(away / width - 0.5, 0.0, 1.0)
-        out[mine] = t * t * (3.0 - 2.0 * t)
+        out[mine] = _grown(away / width)
+    for a, b in zip(*np.nonzero(folds), strict=True):
+        mine, others = np.flatnonzero(label == a), np.flatnonzero(label == b)
+        if len(mine) and len(others):
+            away, _ = cKDTree(middle[others]).query(middle[mine])
+            out[mine] = np.minimum(out[mine], _grown(away / (_CREASED * width)))
     return out
 
 
-def excluded_pairs(
-    mesh: HexMesh, faces: NDArray[np.int32], label: NDArray[np.int32], names: Sequence[str], near: float
-) -> NDArray[np.bool_]:
-    """Pairs of labels that are excluded from contact, symmetric, shape (L, L) (R127).
+def _grown(away: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Contact factor at distances from a border, in widths of the transition."""
+    t = np.clip(away - 0.5, 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
 
-    These are pairs that belong together (``joined_pairs``), except for a finger's first and last phalanx, which touch
-    in a tight fist; and all pairs within ``near`` of each other at rest: webs, and digits modelled side by side.
+
+def excluded_pairs(
+    mesh: HexMesh,
+    faces: NDArray[np.int32],
+    label: NDArray[np.int32],
+    names: Sequence[str],
+    near: float,
+    joined: NDArray[np.bool_],
+    folds: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Pairs of labels that are excluded from contact, symmetric, shape (L, L) (R127, R140).
+
+    These are pairs that belong together, except for a finger's first and last phalanx, which touch in a tight fist, and
+    the two sides of a crease; all pairs within ``near`` of each other at rest: webs, and digits modelled side by side;
+    and what cannot reach one another, a foot and the face.
 
     Args:
         mesh: Mesh at rest.
@@ -149,11 +211,13 @@ def excluded_pairs(
         label: Their labels, shape (F,).
         names: Names of the labels.
         near: Distance below which pairs are excluded [m].
+        joined: Pairs that belong together, shape (L, L).
+        folds: Pairs that a limb folds between, shape (L, L).
     """
     from scipy.spatial import cKDTree
 
     count = len(names)
-    out = joined_pairs(names) & ~_ends(names)
+    out = joined & ~_ends(names) & ~folds | _unreachable(names)
     quads = mesh.quads(faces)
     points = np.concatenate([mesh.nodes[quads].reshape(-1, 3), mesh.nodes[quads].mean(axis=1)])
     kinds = np.concatenate([np.repeat(label, 4), label])
@@ -161,11 +225,26 @@ def excluded_pairs(
     for a in range(count):
         for b in range(a):
             one, other = trees[a], trees[b]
-            if out[a, b] or one is None or other is None:
+            if out[a, b] or folds[a, b] or one is None or other is None:
                 continue
             if one.sparse_distance_matrix(other, near, output_type="coo_matrix").nnz:
                 out[a, b] = out[b, a] = True
     return out
+
+
+def _unreachable(names: Sequence[str]) -> NDArray[np.bool_]:
+    """Pairs of labels of which one cannot come to the other, whatever the joints do, symmetric, shape (L, L)."""
+    words = [name.removesuffix(WEB).split(".")[-1].rstrip("0123456789") for name in names]
+    whole = [name.removesuffix(WEB).split(".") for name in names]
+    low = np.array(
+        [bool({"toe1", "toe3", "toe5"} & set(w)) or word in _FEET for w, word in zip(whole, words, strict=True)]
+    )
+    high = np.array([word in _HEADS for word in words])
+    return np.asarray(low[:, None] & high | high[:, None] & low)
+
+
+_FEET = ("ankle", "heel", "ball")
+_HEADS = ("neck", "head", "top", "chin", "nose_tip")
 
 
 def _digit(name: str) -> str:

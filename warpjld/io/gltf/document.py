@@ -55,6 +55,20 @@ class Document:
         """Raw bytes of every buffer: the GLB's own chunk, data URIs, or files beside the document."""
         return [self._buffer(i, buffer) for i, buffer in enumerate(self.gltf.buffers)]
 
+    def view_bytes(self, index: int | None) -> bytes:
+        """The bytes of a buffer view.
+
+        Raises:
+            InputError: There is no such view, or it ends beyond its buffer.
+        """
+        views = self.gltf.bufferViews
+        if index is None or not 0 <= index < len(views) or not 0 <= views[index].buffer < len(self.gltf.buffers):
+            raise InputError(f"buffer view {index} does not exist", path=self.path)
+        data, start = self.buffers[views[index].buffer], views[index].byteOffset or 0
+        if start < 0 or not 0 <= views[index].byteLength <= len(data) - start:
+            raise InputError(f"buffer view {index} ends beyond its buffer", path=self.path)
+        return data[start : start + views[index].byteLength]
+
     def accessor(self, index: int) -> NDArray[Any]:
         """An accessor's elements, shape (n,), (n, k) or (n, rows, columns); normalised integers as float64.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.io.gltf.document import Document, open_document
 from warpjld.io.gltf.influences import read_gltf_influences
-from warpjld.io.gltf.texture import texture_coordinates
+from warpjld.io.gltf.texture import base_color_picture, texture_coordinates
 from warpjld.io.gltf.triangles import is_surface, primitive_points, primitive_triangles
 from warpjld.io.rig_meshes import RigMesh, joined
 from warpjld.io.source import SourceRig
@@ -186,7 +186,8 @@ def _primitive(
     moved = float(np.abs(placed - (points @ rigid[:3, :3].T + rigid[:3, 3])).max(initial=0.0))
     uv = texture_coordinates(document, primitive, len(points), name)
     follows = -1 if skinned else int(joints[0])
-    return RigMesh(name, placed, faces, joints[indices], weights, follows, uv=uv), moved
+    picture = base_color_picture(document, primitive)
+    return RigMesh(name, placed, faces, joints[indices], weights, follows, uv=uv, texture=picture), moved
 
 
 def _inverse_binds(document: Document, index: int) -> NDArray[np.float64]:

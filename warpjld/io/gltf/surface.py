@@ -12,7 +12,7 @@ import numpy as np
 
 from warpjld.errors import InputError
 from warpjld.io.gltf.document import Document, open_document
-from warpjld.io.gltf.texture import texture_coordinates
+from warpjld.io.gltf.texture import base_color_picture, texture_coordinates
 from warpjld.io.gltf.triangles import is_surface, primitive_points, primitive_triangles
 from warpjld.io.rig_meshes import RigMesh
 from warpjld.limits import check_limit
@@ -65,6 +65,7 @@ def _meshes(document: Document) -> list[RigMesh]:
                     np.zeros((len(points), 1), dtype=np.int64),
                     np.ones((len(points), 1)),
                     uv=texture_coordinates(document, primitive, len(points), name),
+                    texture=base_color_picture(document, primitive),
                 )
             )
     return out

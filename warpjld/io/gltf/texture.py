@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.input_file import read_bytes
 from warpjld.io.gltf.document import Document
+from warpjld.io.gltf.schema import inside_folder
 
-__all__ = ["texture_coordinates"]
+__all__ = ["base_color_picture", "texture_coordinates"]
 
 
 def texture_coordinates(document: Document, primitive: Any, count: int, name: str) -> NDArray[np.float32] | None:
@@ -36,6 +39,25 @@ def texture_coordinates(document: Document, primitive: Any, count: int, name: st
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         uv = (uv * moved.get("scale", (1.0, 1.0))) @ turn.T + moved.get("offset", (0.0, 0.0))
     return (uv * [1.0, -1.0] + [0.0, 1.0]).astype(np.float32)
+
+
+def base_color_picture(document: Document, primitive: Any) -> bytes | None:
+    """Picture of the base colour of a primitive, as its file holds it; None without one, or where it is not there."""
+    info, gltf = _base_colour(document, primitive), document.gltf
+    if info is None or info.index is None or not 0 <= info.index < len(gltf.textures):
+        return None
+    source = gltf.textures[info.index].source
+    if source is None or not 0 <= source < len(gltf.images):
+        return None
+    picture = gltf.images[source]
+    try:
+        if picture.uri is None:
+            return document.view_bytes(picture.bufferView)
+        if picture.uri.startswith("data:"):
+            return base64.b64decode(picture.uri.partition(",")[2])
+        return read_bytes(document.path.parent / inside_folder(picture.uri))
+    except (InputError, ValueError):  # a surface is read whether or not its pictures lie beside it
+        return None
 
 
 def _base_colour(document: Document, primitive: Any) -> Any:

@@ -53,12 +53,23 @@ def light(scene: Scene, arguments: Arguments) -> None:
 
 @command(
     "BACKDROP",
-    syntax='BACKDROP "<colour>" ["<colour above>"]',
-    help="Background of pictures and films: one colour, or a vertical gradient of two.",
+    syntax='BACKDROP "<colour>" ["<colour above>"] or BACKDROP PICTURE "<picture file>"',
+    help="Background of pictures and films: one colour, a vertical gradient of two, or a picture file.",
     group="Output",
 )
 def backdrop(scene: Scene, arguments: Arguments) -> None:
     """Background of pictures and films (R135)."""
+    if arguments.keyword("PICTURE"):
+        from warpjld.render.backdrop import check_backdrop
+
+        path = arguments.input_file("a picture file")
+        try:
+            check_backdrop(path)
+        except InputError as error:
+            raise arguments.error(error.message) from None
+        scene.backdrop_picture = path
+        return
+    scene.backdrop_picture = None
     below = read_color(arguments)
     scene.backdrop = below, read_color(arguments) if arguments else below
 
@@ -74,7 +85,7 @@ def color(scene: Scene, arguments: Arguments) -> None:
     name = arguments.name("an actor's or an object's name").upper()
     chosen = read_color(arguments)
     if name in scene.props:
-        scene.props[name].color = chosen
+        scene.props[name].color, scene.props[name].colored = chosen, True
     elif name in scene.actors:
         scene.actors[name].color = chosen
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
@@ -25,7 +26,7 @@ _MODELLED = ("REVOLVE", "SWEEP", "SOFT")
 @command(
     "OBJECT",
     syntax=(
-        'OBJECT <name> <BALL/BOX/CYLINDER/PLATE/GLASS> [<metres> …] or OBJECT <name> "<surface file>" '
+        'OBJECT <name> <BALL/BOX/CYLINDER/PLATE/GLASS> [<metres> …] or OBJECT <name> "<surface or volume file>" '
         "[UNIT <M/CM/MM/…>] [UP <X/Y/Z>] [CENTRE] or OBJECT <name> REVOLVE <radius> <y> … or "
         "OBJECT <name> SWEEP <u> <v> … ALONG <x> <y> <z> … or OBJECT <name> SOFT <x> <y> <z> <radius> …, "
         "then [SCALE <factor>] [AT <x> <y> <z>] [TURN <x> <y> <z>] "
@@ -89,7 +90,7 @@ def object_(scene: Scene, arguments: Arguments) -> None:
     thing = thing.placed(cast(tuple, options.get("at", (0.0, 0.0, 0.0))), turn.as_quat())
     color = str(options.get("color", COLORS[len(scene.props) % len(COLORS)]))
     assumed = "m" if path is not None and shapes is None and "unit" not in options else None
-    scene.props[name] = Prop(name, thing, color, shapes=shapes, assumed=assumed)
+    scene.props[name] = Prop(name, thing, color, shapes=shapes, assumed=assumed, colored="color" in options)
     if path is not None:
         unit = None if shapes is not None else str(options.get("unit", "m"))
         hands = [length for actor in scene.actors.values() if (length := hand_length(actor.skeleton))]
@@ -141,12 +142,14 @@ def _color(arguments: Arguments) -> str:
 def _made(name: str, shape: str | None, sizes: list[float], path: object, options: dict[str, object]) -> GraspObject:
     from warpjld.grasp.object_file import load_object
     from warpjld.grasp.shapes import SHAPES
+    from warpjld.simulation.volume_object import VOLUME_FILES, load_volume_object
 
     scale = float(cast(float, options.get("scale", 1.0)))
     if shape is not None:
         return SHAPES[shape](*sizes, name=name).scaled(scale)
-    return load_object(
-        str(path),
+    load = load_volume_object if Path(str(path)).suffix.lower() in VOLUME_FILES else load_object
+    return load(
+        Path(str(path)),
         name=name,
         unit=str(options.get("unit", "m")),
         up=cast(Literal["x", "y", "z"], options.get("up", "y")),

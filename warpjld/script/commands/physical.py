@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from warpjld.errors import InputError
@@ -18,10 +19,13 @@ from warpjld.simulation.specification import (
     SourceLocation,
     name_pair,
 )
+from warpjld.simulation.volume_object import region_names
+from warpjld.skeleton.segments import SEGMENT_JOINTS, segment_joints
 from warpjld.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from warpjld.script.props import Prop
+    from warpjld.skeleton import Skeleton
 
 _LAWS = tuple(law.upper() for law in LAWS)
 
@@ -29,10 +33,10 @@ _LAWS = tuple(law.upper() for law in LAWS)
 @command(
     "PHYSICAL",
     syntax=(
-        f"PHYSICAL <object> [OF <material>] [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] [POISSON <ratio>] "
-        "[DENSITY <kg/m³>] [HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
+        f"PHYSICAL <object> [REGION <region>] [OF <material>] [LAW <{'/'.join(_LAWS)}>] [YOUNG <pascals>] "
+        "[POISSON <ratio>] [DENSITY <kg/m³>] [HOLLOW <wall in metres>] [PRESSURE <pascals>] [ELEMENT <metres>]"
     ),
-    help="Make an object deformable: OF a material, or by law and moduli; HOLLOW with a wall; ELEMENT: mesh size.",
+    help="Make an object, or a REGION of its file, deformable: OF a material, or law and moduli; HOLLOW: with a wall.",
     group="Contact",
 )
 def physical(scene: Scene, arguments: Arguments) -> None:
@@ -41,6 +45,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
     where = arguments.last
     if prop.deforms:
         raise arguments.error(f"{prop.name} is deformed by key frames or by formula: it cannot be physical as well")
+    region = arguments.name("a region's name") if arguments.keyword("REGION") else None
     options = arguments.options(
         of=lambda: arguments.choice("a material", [name.upper() for name in MATERIALS]).lower(),
         law=lambda: arguments.choice("the law", _LAWS).lower(),
@@ -69,18 +74,39 @@ def physical(scene: Scene, arguments: Arguments) -> None:
             f"a wall must be thinner than half of {prop.name}, {0.5 * prop.thing.size.min():g} m", where
         )
     try:
-        scene.contact.physical[prop.name] = ObjectMaterial(**options, where=place(arguments))  # type: ignore[arg-type]
+        material = ObjectMaterial(**options, where=place(arguments))  # type: ignore[arg-type]
     except InputError as error:
         raise arguments.error(error.message, where) from None
+    known = scene.contact.physical.get(prop.name)
+    if region is not None:
+        material = _with_region(arguments, prop, known or ObjectMaterial(where=material.where), region, material)
+    elif known is not None:
+        material = replace(material, regions=known.regions)
+    scene.contact.physical[prop.name] = material
+
+
+def _with_region(
+    arguments: Arguments, prop: Prop, whole: ObjectMaterial, name: str, material: ObjectMaterial
+) -> ObjectMaterial:
+    """An object's material with another of one region of its volume file."""
+    known = [region for region in region_names(prop.thing) if region.lower() == name.lower()]
+    if not known:
+        names = region_names(prop.thing)
+        more = did_you_mean(name, names) or (f"; it has {', '.join(names)}" if names else ": it is from no volume file")
+        raise arguments.error(f"{prop.name} has no region {name}{more}")
+    if material.wall or material.pressure or material.element is not None:
+        raise arguments.error("HOLLOW, PRESSURE and ELEMENT are for an object as a whole, not for a region")
+    others = tuple(one for one in whole.regions if one[0] != known[0])
+    return replace(whole, regions=(*others, (known[0], material)))
 
 
 @command(
     "FLESH",
     syntax=(
-        "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM …] [ELEMENT <metres>] [YOUNG <pascals>] [SKIN <pascals>] "
-        "[POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>]"
+        "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM … or <segment> …] [ELEMENT <metres>] [YOUNG <pascals>] "
+        "[SKIN <pascals>] [POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>] [FLEXION]"
     ),
-    help="Make an actor's flesh deformable, all of it or the digits and palm named; ITSELF: contact of skin with skin.",
+    help="Make an actor's flesh deformable: all, or the digits, palm and segments named; FLEXION: by bending too.",
     group="Contact",
 )
 def flesh(scene: Scene, arguments: Arguments) -> None:
@@ -93,6 +119,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
     digits = []
     while (digit := arguments.keyword(*DIGIT_WORDS, "PALM")) is not None:
         digits.append(digit.lower())
+    segments = _segments(arguments, actor.skeleton) if not digits else []
     options = arguments.options(
         *DIGIT_WORDS,
         "PALM",
@@ -102,11 +129,26 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
         poisson=lambda: arguments.number("Poisson's ratio", minimum=0.3, maximum=0.49),
         stiffening=lambda: arguments.number("the exponent of Fung's law", minimum=0.0, maximum=100.0),
         itself=lambda: arguments.choice("ON or OFF", ("ON", "OFF")) == "ON",
+        flexion=lambda: True,
     )
     if "young" in options:
         options["flesh"] = options.pop("young")
-    named = tuple(dict.fromkeys(digits))
-    scene.contact.flesh[actor.name] = FleshMaterial(named, **options, where=place(arguments))  # type: ignore[arg-type]
+    named, parts = tuple(dict.fromkeys(digits)), tuple(dict.fromkeys(segments))
+    material = FleshMaterial(named, parts, **options, where=place(arguments))  # type: ignore[arg-type]
+    scene.contact.flesh[actor.name] = material
+
+
+def _segments(arguments: Arguments, skeleton: Skeleton) -> list[str]:
+    """Segments that are named next: words with a side before a dot, or of anatomy, that are no option."""
+    out = []
+    while (word := arguments.next_word()) is not None and ("." in word or word.lower() in SEGMENT_JOINTS):
+        name = arguments.name("a segment's name").lower()
+        try:
+            segment_joints(skeleton, name)
+        except InputError as error:
+            raise arguments.error(error.message) from None
+        out.append(name)
+    return out
 
 
 @command(

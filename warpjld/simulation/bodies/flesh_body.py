@@ -20,7 +20,8 @@ from warpjld.fem.hand.laws import hand_laws
 from warpjld.simulation.animation import ActorAnimation
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.kept_flesh import RestingFlesh, resting_flesh
-from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_digits
+from warpjld.simulation.bodies.rest_shape import RestShape, cut_to_bones, cut_to_digits
+from warpjld.simulation.bodies.segment_surface import SegmentSurface, segment_surface
 from warpjld.simulation.bodies.skin_parts import SkinParts, digit_of_label, skin_parts
 from warpjld.simulation.specification import FleshMaterial, located
 from warpjld.skeleton import Poses, Skeleton
@@ -173,7 +174,7 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         InputError: It cannot be meshed in that pose; names the line of its FLESH command.
     """
     poses, skin, notes = actor.pose(start), actor.skin(start), []
-    flesh, element = _meshed(actor, material, poses, skin)
+    flesh, element, part = _meshed(actor, material, poses, skin)
     notes += [f"{actor.name}: {note}" for note in flesh.notes]
     if element != material.element:
         notes.append(
@@ -183,7 +184,12 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         notes.append(f"{actor.name}: {coarse}")
     if flesh.gap > 0.5 * element:
         notes.append(f"{actor.name}: the volume stays up to {1e3 * flesh.gap:.1f} mm off the skin where it folds")
-    shape = cut_to_digits(flesh.hand, poses, skin, material.digits)
+    built = flesh.built
+    if part is None:
+        shape = cut_to_digits(flesh.hand, poses, skin, material.digits)
+    else:
+        ends, built, hand = part.ends(built, element), part.widened(built), part.widened(flesh.hand)
+        shape = cut_to_bones(hand, poses, skin, part.bones(hand), part.share, ends)
     laws = hand_laws(
         shape.hand.mesh.region_names,
         flesh=material.flesh,
@@ -192,13 +198,13 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         stiffening=material.stiffening,
     )
     bones = BoneMotion(shape.hand, actor, start)
-    return flesh_body(actor.name, shape, laws, material, bones, skin_parts(flesh.built)), notes
+    return flesh_body(actor.name, shape, laws, material, bones, skin_parts(built)), notes
 
 
 def _meshed(
     actor: ActorAnimation, material: FleshMaterial, poses: Poses, skin: NDArray[np.float64]
-) -> tuple[RestingFlesh, float]:
-    """Hand meshed at the rig's rest and carried to a pose, with its element edge [m].
+) -> tuple[RestingFlesh, float, SegmentSurface | None]:
+    """Flesh meshed at the rig's rest and carried to a pose, its element edge [m], and the segments it was cut to.
 
     Whether elements at a cut or between two digits are distorted depends on the position of the grid, so slightly
     finer grids are tried in turn. Thin parts need smaller elements.
@@ -210,7 +216,10 @@ def _meshed(
     for share in _SIZES:
         element = share * material.element
         try:
-            return resting_flesh(actor.rig, element, actor.name.lower(), poses, skin), element
+            if not material.segments:
+                return resting_flesh(actor.rig, element, actor.name.lower(), poses, skin), element, None
+            part = segment_surface(actor.rig, actor.covering, material.segments, element)
+            return resting_flesh(part.rig, element, actor.name.lower(), poses, skin[part.vertices]), element, part
         except InputError as error:
             failure = failure or error
     assert failure is not None

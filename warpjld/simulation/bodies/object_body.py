@@ -179,7 +179,7 @@ def object_body(
         name=volume.name,
         mesh=volume.mesh,
         faces=volume.name,
-        laws={volume.name: physical.material()},
+        laws=physical.laws(volume.name, volume.regions),
         modulus=physical.young,
         stress=volume.stress,
         surface=volume.surface,

@@ -15,9 +15,10 @@ from warpjld.fem.mesh.fit import fit_mesh
 from warpjld.fem.output.stress import cauchy
 from warpjld.files.kept_values import hash_of, kept_value
 from warpjld.geometry.rotations import unit
-from warpjld.grasp.objects import GraspObject, Places
+from warpjld.grasp.objects import GraspObject, Places, VolumeCells
 from warpjld.simulation.bodies.kept_sources import MESHING
 from warpjld.simulation.specification import ObjectMaterial
+from warpjld.simulation.volume_object import meshed_cells
 
 __all__ = ["ObjectMesh", "mesh_object"]
 
@@ -52,6 +53,7 @@ class ObjectMesh:
         visible: Embedding of the visible surface in the mesh.
         surface: Visible surface at time 0 [m], shape (V, 3).
         faces: Triangles of that surface, shape (T, 3).
+        regions: Names of the regions of its volume file, if it has one.
         stress: Initial stress, in equilibrium with the inner pressure at time 0 [Pa], shape (E, 6) (R98).
         notes: Messages about cache files that could not be used.
     """
@@ -65,6 +67,7 @@ class ObjectMesh:
     faces: NDArray[np.int32]
     stress: NDArray[np.float64]
     notes: tuple[str, ...] = ()
+    regions: tuple[str, ...] = ()
 
     @property
     def inside(self) -> str:
@@ -88,7 +91,9 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
     """
     shape = replace(physical, where=None, prestress=(0.0,) * 6)
-    key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, shape)
+    shape = replace(shape, regions=())
+    cells = None if thing.cells is None else (thing.cells.nodes, thing.cells.elements, thing.cells.regions)
+    key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, shape, cells)
     classes = (_Local, HexMesh, Embedding)
     local, notes = kept_value("object", key, classes, lambda: _meshed(name, thing, physical), modules=MESHING)
     turn = place.apply(np.eye(3))[0] - place.apply(np.zeros((1, 3)))[0]
@@ -103,6 +108,7 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
         thing.faces,
         _turned(local.stress + np.array(physical.prestress), turn.T),
         notes,
+        () if thing.cells is None else thing.cells.region_names,
     )
 
 
@@ -117,6 +123,8 @@ class _Local:
 
 def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
     """Mesh an object in its own frame (see ``mesh_object``)."""
+    if thing.cells is not None:
+        return _from_cells(name, thing, thing.cells, physical)
     size = physical.element or float(thing.size.min()) / _ACROSS
     _refuse_many(thing, physical.wall, size)
     if thing.origin == "ball":
@@ -124,7 +132,7 @@ def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
     else:
         if thing.origin == "box":
             counts = np.maximum(1, np.round(thing.size / size)).astype(int)
-            mesh = box_hexes(thing.size, tuple(counts), origin=-0.5 * thing.size)
+            mesh = box_hexes(thing.size, tuple(counts), origin=thing.vertices.min(axis=0))
         elif thing.origin == "cylinder" and not physical.wall:  # its faces are narrow at the rims
             mesh = _cylinder(thing, size)
         else:
@@ -143,6 +151,18 @@ def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
     except InputError as error:
         raise InputError(f"elements of {size:g} m are too large, thin parts are left out ({error.message})") from error
     return _Local(mesh, visible, stress)
+
+
+def _from_cells(name: str, thing: GraspObject, cells: VolumeCells, physical: ObjectMaterial) -> _Local:
+    """The volume mesh of an object's file.
+
+    Raises:
+        InputError: Something of it that the file decides.
+    """
+    if physical.wall or physical.element is not None:
+        raise InputError("its file has a volume mesh: HOLLOW and ELEMENT are for surfaces")
+    mesh = meshed_cells(name, cells)
+    return _Local(mesh, embed(mesh, thing.vertices), np.zeros((len(mesh.elements), 6)))
 
 
 def _refuse_many(thing: GraspObject, wall: float, size: float) -> None:
@@ -173,7 +193,8 @@ def _cylinder(thing: GraspObject, size: float) -> HexMesh:
     mesh = cylinder_hexes(radius, length, n=count, along=max(2, round(length / size)))
     x, y, z = mesh.nodes.T
     upright = np.stack([x, z - 0.5 * length, -y], axis=1)
-    return replace(mesh, nodes=upright)
+    middle = 0.5 * (thing.vertices.min(axis=0) + thing.vertices.max(axis=0))
+    return replace(mesh, nodes=upright + middle)
 
 
 def _shell(solid: HexMesh, wall: float) -> HexMesh:

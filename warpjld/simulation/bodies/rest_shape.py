@@ -23,7 +23,7 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.fem.mesh.untangle import as_far, improve
 from warpjld.skeleton import Poses
 
-__all__ = ["RestShape", "cut_to_digits", "rest_in_pose"]
+__all__ = ["RestShape", "cut_to_bones", "cut_to_digits", "rest_in_pose"]
 
 _LEAST = 0.05
 """Least scaled Jacobian of carried elements; skin nodes stay off the skin where following it would be worse."""
@@ -205,12 +205,33 @@ def cut_to_digits(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digi
     Raises:
         InputError: No bone belongs to a digit.
     """
-    start = hand.moves(poses)
     if not digits:
-        return RestShape(hand, start, np.empty(0, np.int64), np.ones(len(skin)), skin)
+        return RestShape(hand, hand.moves(poses), np.empty(0, np.int64), np.ones(len(skin)), skin)
     mine = np.array([bool(_digits(segment) & set(digits)) for segment in hand.segments])
     if not mine.any():
         raise InputError(f"flesh: no bone belongs to {', '.join(digits)}")
+    return cut_to_bones(hand, poses, skin, mine)
+
+
+def cut_to_bones(
+    hand: FleshHand,
+    poses: Poses,
+    skin: NDArray[np.float64],
+    mine: NDArray[np.bool_],
+    share: NDArray[np.float64] | None = None,
+    ends: NDArray[np.int64] | None = None,
+) -> RestShape:
+    """The flesh of some bones of a posed hand or body.
+
+    Args:
+        hand: At rest in ``poses``.
+        poses: That pose.
+        skin: Its surface there [m], shape (V, 3).
+        mine: The bones, shape (B,).
+        share: How far the flesh shapes the vertices, shape (V,); everywhere fully if left out.
+        ends: Nodes where the mesh ends within the flesh, and which follow the bones.
+    """
+    start = hand.moves(poses)
     own = hand.weights[:, mine].sum(axis=1)
     mesh = hand.mesh
     kept = own[mesh.elements].max(axis=1) > _OWN
@@ -219,8 +240,11 @@ def cut_to_digits(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digi
     number[used] = np.arange(len(used))
     row = np.full(len(mesh.elements), -1)
     row[kept] = np.arange(int(kept.sum()))
-    cut = number[np.intersect1d(used, np.unique(mesh.elements[~kept]))]
+    inner = np.unique(mesh.elements[~kept])
+    ends = np.empty(0, np.int64) if ends is None else ends
+    cut = number[np.intersect1d(used, np.union1d(inner, ends))]
     faces = kept[hand.skin_faces[:, 0]]
+    faces &= ~np.isin(mesh.quads(hand.skin_faces), ends).all(axis=1)
     skin_faces = np.stack([row[hand.skin_faces[faces, 0]], hand.skin_faces[faces, 1]], axis=1).astype(np.int32)
     sub = HexMesh(
         mesh.nodes[used],
@@ -235,9 +259,9 @@ def cut_to_digits(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digi
     embedding = hand.flesh.skin
     corners = number[embedding.corners]
     whole = np.asarray((corners >= 0).all(axis=1))
-    share = np.einsum("pa,pa->p", embedding.weights, own[embedding.corners])
-    t = np.clip((share - _OWN - 0.05) / 0.35, 0.0, 1.0)
-    blend = np.where(whole, t * t * (3.0 - 2.0 * t), 0.0)
+    owned = np.einsum("pa,pa->p", embedding.weights, own[embedding.corners])
+    t = np.clip((owned - _OWN - 0.05) / 0.35, 0.0, 1.0)
+    blend = np.where(whole, t * t * (3.0 - 2.0 * t), 0.0) * (1.0 if share is None else share)
     flesh = replace(hand.flesh, mesh=sub, skin=replace(embedding, corners=np.where(whole[:, None], corners, 0)))
     smaller = replace(
         hand,

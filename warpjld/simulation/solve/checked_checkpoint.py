@@ -51,6 +51,7 @@ def check_checkpoint(
         _check(one.displacement, (count, 3), f"{what}: displacements")
         _check(one.reactions, (count, 3), f"{what}: reactions")
         _check(one.nodal, (pairs, count, 3), f"{what}: contact forces")
+        _check(one.bonded, (pairs,), f"{what}: shares of bonds")
         for part in fields(one.nodal_contact):
             _check(getattr(one.nodal_contact, part.name), (pairs, count), f"{what}: nodal {part.name}")
         if one.solves < 0 or not 0.0 <= one.penetration < np.inf:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant
+from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.results.nodal_contact import NodalContact, stacked
 from warpjld.simulation.bodies.model import ContactModel
 
@@ -27,6 +28,7 @@ class SolvedFrame:
         nodal_contact: Normal force, contact area and slip of each pair on all nodes, shape (P, N).
         solves: Number of linear solves.
         penetration: Deepest penetration [m].
+        bonded: Share of each pair's bond that still holds, 1 where there is none, shape (P,).
     """
 
     frame: float
@@ -36,6 +38,7 @@ class SolvedFrame:
     nodal_contact: NodalContact
     solves: int
     penetration: float
+    bonded: NDArray[np.float64]
 
     def pressure(self, model: ContactModel) -> NDArray[np.float64]:
         """Contact pressure at the nodes: normal force over tributary area [Pa], shape (N,)."""
@@ -44,8 +47,8 @@ class SolvedFrame:
         return np.divide(force, area, out=np.zeros(len(area)), where=area > 0.0)
 
 
-def solved_frame(frame: float, instants: Sequence[ContactInstant]) -> SolvedFrame:
-    """Results of a frame from its load steps, the last of them at the frame; slip is summed over all steps."""
+def solved_frame(frame: float, instants: Sequence[ContactInstant], states: Sequence[ContactState] = ()) -> SolvedFrame:
+    """Results of a frame from its load steps, the last of them, with its contact states, at the frame; slip adds up."""
     last = instants[-1]
     count = len(last.displacement)
     nodal = np.stack([t.nodal for t in last.touches]) if last.touches else np.zeros((0, count, 3))
@@ -57,4 +60,11 @@ def solved_frame(frame: float, instants: Sequence[ContactInstant]) -> SolvedFram
     deepest = max((float(np.maximum(-t.gap, 0.0).max(initial=0.0)) for t in last.touches), default=0.0)
     solves = sum(instant.solves for instant in instants)
     whole = replace(nodal_contact, slid=slid)
-    return SolvedFrame(frame, last.displacement, last.reactions, nodal, whole, solves, deepest)
+    bonded = np.array([_bonded(state) for state in states] or [1.0] * len(last.touches))
+    return SolvedFrame(frame, last.displacement, last.reactions, nodal, whole, solves, deepest, bonded)
+
+
+def _bonded(state: ContactState) -> float:
+    """Share of the points that were bonded at first which still are."""
+    at_first = np.isfinite(state.bond_gap)
+    return float(state.bonded[at_first].mean()) if at_first.any() else 1.0

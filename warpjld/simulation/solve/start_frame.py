@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,8 @@ def find_start(
     free = [name for name in contact.physical if name not in stands]
     keyed = any(state.tracks for state in contact.prescribed.values())
     # a supported object deforms so little under its weight that this can be left to the first solved step
-    if keyed or contact.loaded or (any(contact.gravity) and not fell and (free or not contact.grips)):
+    bends = any(flesh.flexion for flesh in contact.flesh.values())
+    if keyed or bends or contact.loaded or (any(contact.gravity) and not fell and (free or not contact.grips)):
         return StartFrame(float(request.first), {})
     return _Approach(animation, contact, free).start(request)
 
@@ -147,6 +149,8 @@ class _Approach:
         flesh = self._contact.flesh
         if any(_meets_itself(actor, flesh[name], skins[name]) for name, actor in self._actors.items()):
             return None
+        if self._actors_meet(frame, skins):
+            return None
         objects = self._animation.objects
         obstacles = {name: one.obstacle(frame) for name, one in objects.items() if name not in self._free}
         obstacles |= {name: SkinObstacle(actor, frame) for name, actor in self._bystanders.items()}
@@ -164,6 +168,17 @@ class _Approach:
                 return None
             places |= {} if place is None else {name: place}
         return places
+
+    def _actors_meet(self, frame: float, skins: dict[str, NDArray[np.float64]]) -> bool:
+        """Whether skin of two actors whose flesh deforms has passed through one another (R126)."""
+        for one, other in combinations(self._actors, 2):
+            low, high = (np.stack([how(skins[name], axis=0) for name in (one, other)]) for how in (np.min, np.max))
+            if (low.max(axis=0) > high.min(axis=0)).any():
+                continue
+            for solid, name in ((one, other), (other, one)):
+                if _inside(SkinObstacle(self._actors[solid], frame), skins[name]):
+                    return True
+        return False
 
     def _free_object(
         self, name: str, frame: float, obstacles: list[Obstacle], skins: dict[str, NDArray[np.float64]]

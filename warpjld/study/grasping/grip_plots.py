@@ -146,7 +146,7 @@ def _palm(choice: Any, pressure: NDArray[np.float64], scale: Any) -> NDArray[np.
 
     hand = hand_of(choice)
     skin = hand.rig.surface.vertices
-    axes = {"forward": hand.palm.normal, "up": hand.palm.fingers}
-    camera = Camera.view("front", skin, **axes, side=hand.side, size=_VIEW)
+    palm = hand.palm
+    camera = Camera.view("front", skin, forward=palm.normal, up=palm.fingers, side=hand.side, size=_VIEW)
     with SceneRenderer(hand.rig.surface.faces, camera, size=_VIEW, scale=scale) as scene:
         return scene.draw(skin, values=pressure)

@@ -1,0 +1,111 @@
+"""Objects cut into pieces that bonds hold together (B §3.2, R101, R102, R141)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from warpjld.errors import InputError
+from warpjld.script.arguments import Arguments
+from warpjld.script.commands.physical import place, read_object
+from warpjld.script.registry import command
+from warpjld.script.scene import Scene
+from warpjld.simulation.specification import BondStrength
+
+if TYPE_CHECKING:
+    from warpjld.grasp import GraspObject
+    from warpjld.script.props import Prop
+
+_AXES = ("X", "Y", "Z")
+_MOST = 100
+_NEAR = 1e-6
+"""Distance between two pieces at which they meet, over the size of the whole."""
+
+
+@command(
+    "PIECES",
+    syntax="PIECES <object> <count> [ALONG <X/Y/Z>] [BOND <tension in pascals> [<shear>]] or PIECES <object> REGIONS "
+    "[BOND …]",
+    help="Cut an object into bonded pieces <object>_1, … across its longest axis, or by regions of its volume file.",
+    group="Contact",
+)
+def pieces(scene: Scene, arguments: Arguments) -> None:
+    """Cut an object into bonded pieces, each an object with a law of its own (R101, R141)."""
+    from warpjld.grasp.pieces import cut_object, longest_axis
+    from warpjld.simulation.volume_object import pieces_by_region
+
+    prop = read_object(scene, arguments)
+    where = arguments.last
+    if prop.deforms:
+        raise arguments.error(f"{prop.name} is deformed by key frames or by formula: it cannot be cut")
+    if prop.placement.tracks or prop.associations or _is_named(scene, prop.name):
+        raise arguments.error(f"{prop.name} is moved, bonded or held already: cut it first, then move its pieces")
+    regions = arguments.keyword("REGIONS") is not None
+    count = 0 if regions else arguments.integer("the number of pieces", minimum=2, maximum=_MOST)
+    options = arguments.options(
+        along=lambda: _AXES.index(arguments.choice("the axis", _AXES)),
+        bond=lambda: _strength(arguments),
+    )
+    try:
+        if regions:
+            if "along" in options:
+                raise InputError("ALONG is for a number of pieces: regions are as the file has them")
+            cut = pieces_by_region(prop.thing)
+        else:
+            cut = cut_object(prop.thing, count, cast(int, options.get("along", longest_axis(prop.thing))))
+    except InputError as error:
+        raise arguments.error(error.message, where) from None
+    made = _replaced(scene, prop, cut, arguments)
+    normal, shear = cast(tuple[float, float], options.get("bond", (np.inf, np.inf)))
+    for one, other in _neighbours(cut):
+        scene.contact.bonds.append(BondStrength(made[one], made[other], normal, shear, place(arguments)))
+
+
+def _strength(arguments: Arguments) -> tuple[float, float]:
+    normal = arguments.number("the tension in Pa at which they part", above=0.0)
+    return normal, arguments.number(
+        "the shear in Pa at which they part", above=0.0
+    ) if arguments.has_number() else normal
+
+
+def _is_named(scene: Scene, name: str) -> bool:
+    """Whether contact knows of an object's points, loads or bonds."""
+    contact = scene.contact
+    bonded = any(name in (bond.one, bond.other) for bond in contact.bonds)
+    return bonded or name in contact.loaded or any(name == one for one, _ in contact.points)
+
+
+def _replaced(scene: Scene, prop: Prop, cut: list[GraspObject], arguments: Arguments) -> list[str]:
+    """Put pieces where the whole was; their names."""
+    from warpjld.script.props import COLORS
+    from warpjld.script.props import Prop as Piece
+
+    names = [thing.name.upper() for thing in cut]
+    if taken := [name for name in names if name in scene.props or name in scene.actors]:
+        raise arguments.error(f"there is an object or actor {taken[0]} already")
+    props = dict(scene.props)
+    del scene.props[prop.name]
+    physical = scene.contact.physical.pop(prop.name, None)
+    first = list(props).index(prop.name)
+    for k, (name, thing) in enumerate(zip(names, cut, strict=True)):
+        color = prop.color if k == 0 else COLORS[(first + k) % len(COLORS)]
+        scene.props[name] = Piece(name, thing, color, assumed=prop.assumed)
+        if physical is not None:
+            scene.contact.physical[name] = replace(physical, regions=())
+    return names
+
+
+def _neighbours(cut: list[GraspObject]) -> list[tuple[int, int]]:
+    """Pairs of pieces whose surfaces share three places or more."""
+    from scipy.spatial import cKDTree
+
+    size = max(float(thing.size.max()) for thing in cut)
+    trees = [cKDTree(thing.vertices) for thing in cut]
+    return [
+        (a, b)
+        for a in range(len(cut))
+        for b in range(a + 1, len(cut))
+        if trees[a].count_neighbors(trees[b], _NEAR * size) >= 3
+    ]
