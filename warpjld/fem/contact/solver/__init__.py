@@ -51,6 +51,9 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
 search can follow (``course`` predicts the motion) and finds nodes deep inside another body; ``first_touch`` finds when
 in a step frictional contact begins.
 
+Numeric constants of these modules have their units in brackets, none if they are dimensionless; those without a stated
+reason or source are assumed.
+
 - P. Alart, A. Curnier 1991, A mixed formulation for frictional contact problems prone to Newton like solution methods,
   Comput. Methods Appl. Mech. Eng. 92, 353–375.
 - J. C. Simo, T. A. Laursen 1992, An augmented Lagrangian treatment of contact problems involving friction, Comput.
