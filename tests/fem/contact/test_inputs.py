@@ -18,7 +18,7 @@ from warpjld.fem import (
     cylinder_hexes,
     prescribe,
 )
-from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.contact import Bond, ContactError, Exclusion, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane, Sphere
 from warpjld.fem.contact.solver.damping import Damping
@@ -210,14 +210,12 @@ def test_a_stiffness_that_is_not_positive_definite_is_damped_for_a_step() -> Non
     for less, solvable in ((0.5, True), (1.1, True), (9.0, False)):
         given = BlockMatrix(rest.rows, rest.columns, (1.0 - less) * rest.values)
         solver, damping = LaggedSolver(body, "float64"), Damping(body)
-        done = None
-        while done is None:
-            try:
-                done = solver.solve(damping.lend(given), free, right)
-            except IndefiniteError:
-                if not damping.more():
-                    break
-        assert (done is not None and done.status is SolveStatus.CONVERGED and done.x @ right > 0.0) == solvable
+
+        def attempt(given=given, solver=solver, damping=damping):
+            return solver.solve(damping.lend(given), free, right)
+
+        done = damping.until_definite(attempt)
+        assert (done.status is SolveStatus.CONVERGED and done.x @ right > 0.0) == solvable
         assert (damping.share > max(0.0, less - 1.0)) == (less > 1.0)
     damping.begin()
     assert damping.lend(given) is given

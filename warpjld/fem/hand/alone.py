@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import norm
-from warpjld.fem.assembly.block_matrix import IndefiniteError
 from warpjld.fem.body import Body, Tangent
 from warpjld.fem.contact.solver.damping import Damping
 from warpjld.fem.contact.solver.elastic import Elastic
@@ -186,15 +185,7 @@ class FleshAlone:
 
     def _move(self, tangent: Tangent, residual: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """A Newton step (3N,), damped as far as needed; None if that fails."""
-        assert tangent.stiffness is not None
-        while True:
-            try:
-                done = self._solver.solve(self._damping.lend(tangent.stiffness), self._free, residual)
-                if done.status is SolveStatus.CONVERGED:
-                    return done.x
-                if done.status is not SolveStatus.INDEFINITE:
-                    return None
-            except IndefiniteError:
-                pass
-            if not self._damping.more():
-                return None
+        stiffness, damping = tangent.stiffness, self._damping
+        assert stiffness is not None
+        done = damping.until_definite(lambda: self._solver.solve(damping.lend(stiffness), self._free, residual))
+        return done.x if done.status is SolveStatus.CONVERGED else None

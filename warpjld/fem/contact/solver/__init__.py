@@ -48,8 +48,11 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
 ``contact_system`` evaluates (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` f_int, f_ext and K.
 ``unconstrained`` stabilises bodies held by contact alone, and explains a failure: unheld, sliding or blocked;
 ``statics`` proves that friction cannot hold a body before that is reported. ``passing`` cuts steps longer than contact
-search can follow (``course`` predicts the motion) and finds nodes deep inside another body; ``first_touch`` finds when
-in a step frictional contact begins.
+search can follow (by the ``predicted_motion``) and finds nodes deep inside another body; ``first_touch`` finds when
+in a step frictional contact begins; ``friction_continuation`` helps where friction alone holds a body.
+
+Numeric constants of these modules have their units in brackets, none if they are dimensionless; those without a stated
+reason or source are assumed.
 
 - P. Alart, A. Curnier 1991, A mixed formulation for frictional contact problems prone to Newton like solution methods,
   Comput. Methods Appl. Mech. Eng. 92, 353–375.

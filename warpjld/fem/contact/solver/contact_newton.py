@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from warpjld.fem.arrays import Array
-from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
+from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.law.contact_state import ContactState
@@ -143,10 +143,9 @@ class ContactNewton:
             done = self._solved_with(state, lambda matrix: matrix)
             if done.status is not SolveStatus.INDEFINITE:
                 return done
-        while True:
-            done = self._solved_with(state, lambda matrix: unconstrained.steadied(matrix, state.turn))
-            if done.status is not SolveStatus.INDEFINITE or not self._damping.more():
-                return done
+        return self._damping.until_definite(
+            lambda: self._solved_with(state, lambda matrix: unconstrained.steadied(matrix, state.turn))
+        )
 
     def _solved_with(self, state: NewtonState, steadied: Callable[[BlockMatrix], BlockMatrix]) -> Iteration:
         """Free displacements of a Newton step with the current damping and a function that stabilises the matrix."""
@@ -158,10 +157,7 @@ class ContactNewton:
         right = state.residual - matrix.product(state.jump, threads=self.body.threads)
         if contact.nonsymmetric is not None:
             right -= state.free * (contact.nonsymmetric @ state.jump)
-        try:
-            done = self._solver.solve(matrix, state.free, right, contact.nonsymmetric)
-        except IndefiniteError:
-            done = Iteration(np.zeros_like(right), SolveStatus.INDEFINITE, 0, 1.0, np.empty(0))
+        done = self._solver.solve(matrix, state.free, right, contact.nonsymmetric)
         self.solves += 1
         self.iterations += done.iterations
         return done

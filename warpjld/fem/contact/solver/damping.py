@@ -7,9 +7,12 @@ hardly any rigid motion, and does not change the solution (Levenberg 1944, Marqu
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from warpjld.fem.arrays import Array
 from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.body import Body
+from warpjld.fem.solver.krylov import Iteration, SolveStatus
 
 __all__ = ["Damping"]
 
@@ -54,6 +57,13 @@ class Damping:
         """Raise the damping; False if it exceeds the largest value."""
         self.share = max(_FIRST, _MORE * self.share)
         return self.share <= _MOST
+
+    def until_definite(self, attempt: Callable[[], Iteration]) -> Iteration:
+        """Repeat a linear solve with more damping as long as its matrix is indefinite and the damping can be raised."""
+        while True:
+            done = attempt()
+            if done.status is not SolveStatus.INDEFINITE or not self.more():
+                return done
 
     def judge(self, length: float) -> None:
         """Adapt the damping to the length (0 … 1) of the last step: more after a short step, less after a full one."""

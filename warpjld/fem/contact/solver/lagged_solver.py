@@ -56,11 +56,15 @@ class LaggedSolver:
     def solve(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any = None) -> Iteration:
         """Solve K11 x = b for the free degrees of freedom, shape (3N,).
 
-        ``nonsymmetric``, ``csr_array`` (3N, 3N), is added to K; the solve is then preconditioned by K.
-
-        Raises:
-            IndefiniteError: K is not positive definite.
+        ``nonsymmetric``, ``csr_array`` (3N, 3N), is added to K; the solve is then preconditioned by K. Where K is found
+        not to be positive definite, the status is ``INDEFINITE``.
         """
+        try:
+            return self._solved(matrix, free, right, nonsymmetric)
+        except IndefiniteError:
+            return Iteration(np.zeros_like(right), SolveStatus.INDEFINITE, 0, 1.0, np.empty(0))
+
+    def _solved(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any) -> Iteration:
         factor = self._factor(matrix, free)
         if factor is not None:
             if nonsymmetric is None:

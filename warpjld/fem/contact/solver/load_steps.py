@@ -18,11 +18,11 @@ from warpjld.fem.contact.results.contact_solution import ContactInstant, Contact
 from warpjld.fem.contact.results.touches import touch_of
 from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
-from warpjld.fem.contact.solver.course import Course
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
+from warpjld.fem.contact.solver.friction_continuation import continue_in_friction
 from warpjld.fem.contact.solver.newton_state import Equilibrium
 from warpjld.fem.contact.solver.passing import Passing, guess_jumps
-from warpjld.fem.contact.solver.rougher import from_rougher
+from warpjld.fem.contact.solver.predicted_motion import PredictedMotion
 from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads, external_forces
@@ -45,7 +45,7 @@ _CUTS = 400
 """Most cuts of steps in a run, made so that contact search can follow."""
 _TOUCHING = 0.01
 """Smallest fraction of a step at which it is cut for a first contact."""
-_TOUCHES, _TOUCHES_ADRIFT = 8, 2
+_TOUCHES, _TOUCHES_FREE = 8, 2
 """Most halvings of a step in which frictional contact begins after sliding at an unknown time; and the same for a free
 body, which falls however short the step is."""
 _WHOLE = 0.95
@@ -60,19 +60,12 @@ Guess = Callable[[float, float, Array], Array]
 
 
 class LoadSteps:
-    """One run of ``press`` (its arguments are explained there) by the augmented Lagrangian method.
+    """One run of ``press`` by the augmented Lagrangian method; arguments as there.
 
-    Args:
-        body: All bodies, merged.
-        prescribed: Dirichlet conditions.
-        pairs: Contact pairs.
-        loads: Loads.
-        times: Ascending times at which equilibria are returned.
-        after: Solution to continue from.
-        tolerance: Residual relative to the forces in balance.
-        penetration: Admissible penetration, relative to an element edge.
-        guess: Predictor.
-        halvings: Most successive halvings of a load step.
+    Attributes:
+        u: Displacement of the last equilibrium [m], shape (3N,).
+        states: Contact state of each interface there.
+        steps: Number of linear solves of each load step taken.
     """
 
     def __init__(
@@ -97,7 +90,7 @@ class LoadSteps:
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
         self._reaches = [interface.reach for interface in self.interfaces]
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
-        self.course = Course(body)
+        self.motion = PredictedMotion(body)
         self.passing = Passing(body, self.interfaces)
         self.newton = ContactNewton(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
         if halvings == 0:
@@ -167,7 +160,7 @@ class LoadSteps:
                 todo.insert(0, now + share * (target - now))
                 continue
             status, found = self._find(step, carried)
-            most = _TOUCHES_ADRIFT if self.course.adrift(step.prescribed) else _TOUCHES
+            most = _TOUCHES_FREE if self.motion.leaves_free(step.prescribed) else _TOUCHES
             if found is not None and touches < most and slid_unheld(self.interfaces, self.states, self.u, found):
                 touches, unheld = touches + 1, (target, carried, step, found)
                 todo.insert(0, 0.5 * (now + target))
@@ -226,7 +219,7 @@ class LoadSteps:
     def _share(self, step: LoadStep, carried: Array, cut: float, *, may_cut: bool) -> tuple[float, float]:
         """Fraction of a step to take, so that bodies do not pass through each other and friction acts from the first
         contact on; and the fraction due to the former, by which ``guess_jumps`` detects discontinuous predictors."""
-        ahead = self.course.ahead(self.u, step.prescribed) if self.guess is None else carried
+        ahead = self.motion.displacement(self.u, step.prescribed) if self.guess is None else carried
         share = self.passing.share(self.u, ahead, step.before, step.time)
         if share < _WHOLE and may_cut and not guess_jumps(share, cut):
             return share, share
@@ -278,9 +271,9 @@ class LoadSteps:
         guesses = self._guesses(step, carried)
         status, found = self.newton.find(self.u, self.states, step, *guesses)
         # with halvings=0 the caller tries another step instead
-        again = self.halvings != 0 and self._adrift_on_friction(step)
+        again = self.halvings != 0 and self._held_by_friction(step)
         if found is None and again and self._could_hold(step):
-            status, found = from_rougher(self.newton, self.interfaces, self.u, self.states, step, status)
+            status, found = continue_in_friction(self.newton, self.interfaces, self.u, self.states, step, status)
         for _ in range(_BREAKS):
             if found is None:
                 return status, None
@@ -292,9 +285,9 @@ class LoadSteps:
             status, found = self.newton.find(self.u, states, step, found.displacement)
         return SolveStatus.MAX_ITERATIONS, None
 
-    def _adrift_on_friction(self, step: LoadStep) -> bool:
+    def _held_by_friction(self, step: LoadStep) -> bool:
         """Whether a free body may be held by friction."""
-        return self.course.adrift(step.prescribed) and any(i.pair.friction > 0.0 for i in self.interfaces)
+        return self.motion.leaves_free(step.prescribed) and any(i.pair.friction > 0.0 for i in self.interfaces)
 
     def _could_hold(self, step: LoadStep) -> bool:
         """Whether contact forces inside the friction cones could balance every free body (necessary condition)."""

@@ -8,10 +8,10 @@ from warpjld.fem.arrays import Array, Ints
 from warpjld.fem.body import Body
 from warpjld.fem.load.prescribed import Prescribed, components, free_motions
 
-__all__ = ["Course"]
+__all__ = ["PredictedMotion"]
 
 
-class Course:
+class PredictedMotion:
     """Extrapolation of prescribed displacements: free nodes move like the nearest prescribed node of their body.
 
     Args:
@@ -22,17 +22,17 @@ class Course:
         self._nodes = body.mesh.nodes
         self._piece = components(body)
         self._body = body
-        self._adrift: tuple[bytes, bool] | None = None
+        self._free: tuple[bytes, bool] | None = None
         self._nearest: tuple[bytes, list[tuple[Ints, Ints]]] | None = None
 
-    def adrift(self, prescribed: Prescribed) -> bool:
+    def leaves_free(self, prescribed: Prescribed) -> bool:
         """Whether the Dirichlet conditions leave a body free to move rigidly."""
         key = prescribed.degrees.tobytes()
-        if self._adrift is None or self._adrift[0] != key:
-            self._adrift = (key, bool(free_motions(self._body, prescribed)))
-        return self._adrift[1]
+        if self._free is None or self._free[0] != key:
+            self._free = (key, bool(free_motions(self._body, prescribed)))
+        return self._free[1]
 
-    def ahead(self, u: Array, prescribed: Prescribed) -> Array:
+    def displacement(self, u: Array, prescribed: Prescribed) -> Array:
         """Predicted displacement (3N,) from displacement u (3N,); bodies without Dirichlet conditions do not move."""
         out = u.reshape(-1, 3).copy()
         change = np.zeros(u.size)

@@ -13,13 +13,13 @@ from warpjld.fem.contact.solver.contact_system import LoadStep
 from warpjld.fem.contact.solver.newton_state import Equilibrium
 from warpjld.fem.solver.krylov import SolveStatus
 
-__all__ = ["from_rougher"]
+__all__ = ["continue_in_friction"]
 
-_ROUGHER = (8.0, 2.0, 1.2, 1.0)
+_FACTORS = (8.0, 2.0, 1.2, 1.0)
 """Factors on the friction coefficient, in the order of the continuation."""
 
 
-def from_rougher(
+def continue_in_friction(
     newton: ContactNewton,
     interfaces: Sequence[Interface],
     u: Array,
@@ -42,9 +42,9 @@ def from_rougher(
     guess: tuple[Array, ...] = ()
     found: Equilibrium | None = None
     try:
-        for rougher in _ROUGHER:
+        for factor in _FACTORS:
             for interface, pair in zip(interfaces, pairs, strict=True):
-                interface.pair = replace(pair, friction=rougher * pair.friction)
+                interface.pair = replace(pair, friction=factor * pair.friction)
             failure = newton.failure
             found = newton.find(u, states, step, *guess)[1]
             if found is None:
