@@ -1,4 +1,4 @@
-"""A fingertip of the built-in hand pressed on a plate to 5 N: force, displacement and contact area compared with people's.
+"""A fingertip of the built-in hand pressed on a plate to 5 N: force, displacement and area, compared with people.
 
 python examples/fingertip.py [folder] [spacing in mm] [angle between plate and finger in degrees]
 

@@ -2,7 +2,7 @@
 
 python examples/hold_block.py [folder] [weight in N] [friction]
 
-Writes the readings of the pads while they close and while the weight is applied, as a plot and as a table, and a picture
+Writes the readings of the pads while they close and while the weight is applied, as a plot and a table, and a picture
 of the block held. The exact force of each pad is weight / (2 × friction); here it is found by closing the pads.
 """
 

@@ -1,4 +1,4 @@
-"""A hand made of three meshes (fingers, palm, a cuff joined to the wrist) stays in one piece with both methods (A §3, R18).
+"""A hand of three meshes (fingers, palm, a cuff joined to the wrist) stays in one piece with both methods (A §3, R18).
 
 python examples/pieces.py out
 """
