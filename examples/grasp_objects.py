@@ -3,8 +3,8 @@
 python examples/grasp_objects.py FOLDER [STUDY.toml]
 
 The study names hands, objects, friction, seed and the number of placements of which each grasp is the best
-(wrist.best_of); by default a built-in hand grasps a ball, a box, a glass and a plate. Writes into FOLDER grasps.md and a
-picture per hand, with a row per object. A grasp holds if it is force closed and the penetration is at most 1 mm: of
+(wrist.best_of); by default a built-in hand grasps a ball, a box, a glass and a plate. Writes grasps.md into FOLDER, and
+a picture per hand, with a row per object. A grasp holds if it is force closed and the penetration is at most 1 mm: of
 the skin into the object, and of the object into the skin.
 """
 
