@@ -174,7 +174,7 @@ def test_channels_of_scale_are_read_over_and_told_where_they_change(tmp_path: Pa
             lines[len(lines) - 3 + at] = " ".join([*words[:6], str(1 + at * (scale - 1)), *words[-3:]])
         clip, want = read_bvh(write(tmp_path, "\n".join(lines))), read_bvh(write(tmp_path, ARM))
         np.testing.assert_array_equal(clip.rotations, want.rotations)
-        assert clip.warnings == (("the motion scales Arm: scale is ignored",) if scale == 2 else ())
+        assert clip.warnings == (("the motion scales Arm: scale is not followed",) if scale == 2 else ())
 
 
 def test_frames_that_last_long_are_doubted_and_a_single_one_may_last_no_time(tmp_path: Path) -> None:

@@ -445,9 +445,9 @@ def test_the_frame_that_serves_as_rest_is_said_and_need_not_be_the_first(tmp_pat
     recording = record(CONVENTIONS["LAFAN1"], rest="X", frames=FRAMES[::-1])
     moved = play(tmp_path, recording)
     assert_followed(moved, recording)
-    assert any("its frame 2 is used as rest pose" in note for note in moved.notes)
+    assert any("its frame 2 is taken as the rest" in note for note in moved.notes)
     usual = play(tmp_path, record(CONVENTIONS["LAFAN1"]))
-    assert not any("used as rest pose" in note for note in usual.notes)
+    assert not any("taken as the rest" in note for note in usual.notes)
 
 
 def test_without_any_frame_of_somebody_standing_limbs_still_point_as_recorded(tmp_path: Path) -> None:
@@ -466,7 +466,7 @@ def test_lying_down_and_standing_on_hands_stay_what_they_are(tmp_path: Path, res
     lying = record(CONVENTIONS["LAFAN1"], frames=({"pelvis": (-90.0, 0.0, 0.0)},) * 2)
     moved = play(tmp_path, lying)
     assert_followed(moved, lying)
-    assert any("it is assumed to lie" in note for note in moved.notes)
+    assert any("it is taken to lie" in note for note in moved.notes)
 
 
 def mirrored(recording: Recording) -> str:
@@ -528,7 +528,7 @@ def test_who_never_stands_and_whose_rest_tells_nothing(tmp_path: Path, posture: 
     recording = on_the_floor(record(CONVENTIONS["LAFAN1"], frames=NEVER_STANDING[posture], up=up, **how), up)
     moved = play(tmp_path, recording)
     assert_followed(moved, recording)
-    assert any("assumed not to stand" in note for note in moved.notes) == (posture != "sitting")
+    assert any("taken not to stand" in note for note in moved.notes) == (posture != "sitting")
 
 
 SAYINGS = {

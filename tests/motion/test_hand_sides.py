@@ -116,7 +116,7 @@ def test_side_overrides_what_a_file_states_and_bends(tmp_path: Path) -> None:
     poses = webxr_poses(skeleton, "left", postures(skeleton, "left", ("fist",)), ("fist",))
     path = save(tmp_path, {"right": poses})
     loaded = load_motion(path, rig(skeleton), side="left")
-    assert "read as a left one, as requested" in loaded.warnings[0]
+    assert "taken for a left one, as asked for" in loaded.warnings[0]
     same(loaded.poses, postures(skeleton, "left", ("fist",)), skeleton)
     with pytest.raises(InputError, match=r"as a right hand its fingers bend backwards.*leave --side out"):
         load_motion(save(tmp_path, poses), rig(skeleton), side="right")
@@ -148,7 +148,7 @@ def test_a_hand_that_is_its_own_mirror_image_is_the_rigs_or_nobodys(tmp_path: Pa
     path = save(tmp_path, flatter(hand("left")))
     for side in ("left", "right"):
         loaded = load_motion(path, rig(hand(side)))
-        assert f"read as a {side} one, as the rig's" in loaded.notes[0]
+        assert f"taken for a {side} one, as the rig's" in loaded.notes[0]
     with pytest.raises(InputError, match=r"hand.json: the file does not say which hand this is.*--side"):
         load_motion(path, rig(two_hands()))
     assert load_motion(path, rig(two_hands()), side="left").notes == ("the recorded left hand drives the left one",)

@@ -209,7 +209,7 @@ def test_flickering_labels_are_one_hand(tmp_path: Path) -> None:
         ({"image_size": [0, 1], "frames": [{"landmarks": [[0, 0, 0]] * 21}]}, "image_size: want width and height"),
         (
             {"frames": [{"landmarks": [[1e99, 0, 0]] * 21}]},
-            "'wrist' is implausibly far away at frame 0",
+            "'wrist' lies absurdly far away at frame 0",
         ),
         (
             {"frames": [{"landmarks": [[0, 0, 0]] * 21, "time": t} for t in (1, 0)]},
@@ -224,7 +224,7 @@ def test_mistakes_are_named(tmp_path: Path, content: object, message: str) -> No
 
 def test_hands_of_one_point_are_refused(tmp_path: Path) -> None:
     path = save(tmp_path, {"landmarks": [[[0.5, 0.5, 0.0]] * 21], "handedness": "left"})
-    with pytest.raises(InputError, match="palm are in one line or point at frame 0"):
+    with pytest.raises(InputError, match="palm lie in a line or a point at frame 0"):
         load_motion(path, rig(hand("left")))
 
 

@@ -65,7 +65,7 @@ def _hierarchy(lines: BvhLines) -> list[_Joint]:
         inside = joints[open_joints[-1]] if open_joints else None
         if keyword in NAMED:
             if (keyword == "ROOT") != (inside is None):
-                raise lines.error(f"{keyword} is {'inside a joint' if inside else 'outside a ROOT'}")
+                raise lines.error(f"{keyword} stands {'inside a joint' if inside else 'outside a ROOT'}")
             end = keyword in ("END", "ENDSITE") and inside is not None
             name = f"{joints[open_joints[-1]].name} end" if end else " ".join(words[1:])
             if not name:
@@ -119,7 +119,7 @@ def _motion(lines: BvhLines, channels: int) -> tuple[NDArray[np.float64], float,
         lines.number = timed
         raise lines.error(f"Frame Time must be above 0, got {seconds:g}")
     if len(rows) != count:
-        notes.append(f"the motion has {len(rows)} frames, not the {count} it announces: the frames present are used")
+        notes.append(f"the motion has {len(rows)} frames, not the {count} it announces: those that are there are taken")
     rate = 1.0 / seconds
     return np.array(rows), round(rate, 3) if rate > _SLOWEST else rate, notes
 
@@ -168,7 +168,7 @@ def _doubts(joints: list[_Joint], values: NDArray[np.float64], rate: float) -> l
         if kind == "scale" and np.ptp(column) > 1e-3 * np.abs(column).max()
     ]
     if scaled:
-        found.append(f"the motion scales {', '.join(dict.fromkeys(scaled))}: scale is ignored")
+        found.append(f"the motion scales {', '.join(dict.fromkeys(scaled))}: scale is not followed")
     if len(values) > 1 and not _SLOWEST < rate < _FASTEST:
         found.append(f"a frame lasts {1.0 / rate:g} s, as the file says: are other units meant?")
     return found
@@ -193,7 +193,7 @@ def _clip(joints: list[_Joint], values: NDArray[np.float64], rate: float, notes:
         for j, joint in enumerate(joints):
             for axis in (axis for kind, axis in joint.channels if kind == "position" and joint.parent >= 0):
                 places[:, j, axis] += offsets[j, axis]
-        notes = [*notes, "positions of joints are read as additions to their OFFSETs"]
+        notes = [*notes, "positions of joints are taken as additions to their OFFSETs"]
     positions, rotations = places.copy(), turns.copy()
     for j, parent in enumerate(parents):
         rest[j] = offsets[j]

@@ -65,7 +65,7 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
     worlds = scene.worlds[:, skeleton.nodes] @ skeleton.squared
     warnings = _turn_flat_ones(worlds, skeleton.tree)
     if any(stack.shapes for stack in scene.stacks if stack.name == scene.title):
-        warnings.append("the animation of blend shapes is ignored")
+        warnings.append("the animation of blend shapes is not followed")
     told = (*notes, *skeleton.notes)
     return JointAnimation(skeleton.tree, worlds, scene.rate, title=scene.title, notes=told, warnings=tuple(warnings))
 
@@ -80,7 +80,6 @@ def _turn_flat_ones(worlds: NDArray[np.float64], tree: SourceTree) -> list[str]:
         u, _, v = np.linalg.svd(before[:3, :3])
         linear[frame, joint] = _TINY * u @ v
         notes.setdefault(
-            int(joint),
-            f"joint '{tree.names[joint]}' has scale 0 at frame {frame}: it keeps its previous rotation there",
+            int(joint), f"joint '{tree.names[joint]}' is scaled to nothing at frame {frame}: not turned then"
         )
     return list(notes.values())

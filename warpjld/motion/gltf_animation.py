@@ -168,7 +168,7 @@ def _read_channels(document: Document, animations: list[Any]) -> tuple[list[_Key
             if not (0 <= node < len(document.gltf.nodes) and 0 <= channel.sampler < len(animation.samplers)):
                 raise InputError(f"its animation names node {node} or sampler {channel.sampler}", path=document.path)
             keys[node, path] = _Keys(document, animation.samplers[channel.sampler], node, path)
-    return list(keys.values()), [f"the animation of {what} is ignored" for what in left_out]
+    return list(keys.values()), [f"the animation of {what} is not followed" for what in left_out]
 
 
 def _worlds(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[str]]:

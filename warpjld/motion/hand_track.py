@@ -58,7 +58,7 @@ class HandTrack:
         for name, place in self.points.items():
             far = np.abs(place).max(axis=1) > _FARTHEST
             if far.any():
-                raise InputError(f"'{name}' is implausibly far away at {self._label(int(far.argmax()))}")
+                raise InputError(f"'{name}' lies absurdly far away at {self._label(int(far.argmax()))}")
 
     def _label(self, time: int) -> str:
         return self.labels[time] if self.labels else f"frame {time}"
@@ -96,9 +96,7 @@ class HandTrack:
         own = hand_joints(skeleton, self.side)
         palm = [name for name in _PALM if name in own and name in self.points]
         if len(palm) < 4:
-            raise InputError(
-                f"the recording has {len(palm)} joints of the palm; 4 are needed to find how the hand is oriented"
-            )
+            raise InputError(f"the recording has {len(palm)} joints of the palm; 4 are needed to see how the hand lies")
         fixed = [name for name in palm if name not in _MOBILE]
         palm = fixed if len(fixed) > 4 else palm
         rest = skeleton.rest[[own[name] for name in palm]]
@@ -106,7 +104,7 @@ class HandTrack:
         spans = np.linalg.svd(places - places.mean(axis=1, keepdims=True), compute_uv=False)
         thin = spans[:, 1] <= _THIN * spans[:, 0]
         if thin.any():
-            raise InputError(f"the joints of the palm are in one line or point at {self._label(int(thin.argmax()))}")
+            raise InputError(f"the joints of the palm lie in a line or a point at {self._label(int(thin.argmax()))}")
         palm_turn, scale = _fit(rest, places)
         local = np.tile(IDENTITY, (len(self.times), len(skeleton), 1))
         for digit in DIGITS:

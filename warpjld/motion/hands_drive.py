@@ -70,9 +70,7 @@ def poses_of_hands(
             local[:, 0] = slerp(hand.times, turn.root, at)
             root = np.stack([np.interp(at, hand.times, column) for column in turn.displacement.T], axis=-1)
     if any(turn.moves for turn in turns) and not _just_a_hand(skeleton, known[0].side):
-        notes.append(
-            "only fingers follow the recording: the hand's position is ignored for a rig that is more than a hand"
-        )
+        notes.append("only fingers follow the recording: where a hand is does not move a rig that is more than one")
     return poses_from_rotations(skeleton, local, root_position=root), tuple(notes), tuple(warnings)
 
 
@@ -86,7 +84,7 @@ def _sided(hand: HandMotion, own: list[str], side: str | None, notes: list[str],
     bent = bending_side(hand.bends)
     if side is not None:
         if hand.side not in (None, side):
-            warnings.append(f"the file says that this is a {hand.side} hand: read as a {side} one, as requested")
+            warnings.append(f"the file says that this is a {hand.side} hand: taken for a {side} one, as asked for")
         return hand.called(side)
     if hand.side is not None:
         seen = bent or hand.leaning
@@ -95,7 +93,7 @@ def _sided(hand: HandMotion, own: list[str], side: str | None, notes: list[str],
         if hand.may_be_mirrored:
             warnings.append(
                 f"labelled a {hand.side} hand, but shaped like a {seen} one, as in a mirrored (selfie) image: "
-                f"mirrored back; --side {seen} reads it as a {seen} hand instead"
+                f"mirrored back; --side {seen} takes it for a {seen} hand instead"
             )
             return hand.mirrored().called(hand.side)
         if bent is None:
@@ -112,10 +110,10 @@ def _sided(hand: HandMotion, own: list[str], side: str | None, notes: list[str],
         return hand.called(hand.leaning)
     if len(own) == 2:
         raise InputError(
-            "the file does not say which hand this is, and neither fingers nor thumb show it: state it with --side"
+            "the file does not say which hand this is, and neither bends nor thumb tell: state it with --side"
         )
     notes.append(
-        f"the file does not say which hand this is, and neither fingers nor thumb show it: read as a {own[0]} one, "
+        f"the file does not say which hand this is, and neither bends nor thumb tell: taken for a {own[0]} one, "
         "as the rig's (--side to change)"
     )
     return hand.called(own[0])
@@ -160,7 +158,7 @@ def _check_bends(hand: HandMotion, *, given: bool) -> tuple[str, ...]:
     often, far = ((excess > least).mean(axis=0) > _MOST_FRAMES for least in (0.0, _FAR))
     if np.count_nonzero(often) >= _MOST_JOINTS or far.any():
         raise InputError(
-            f"its fingers bend backwards on either hand, worst {worst}: not a hand's motion, or of both hands in turn"
+            f"its fingers bend backwards on either hand, worst {worst}: no hand's motion, or one of both hands in turn"
         )
     frames = int(np.count_nonzero(excess.any(axis=(1, 2))))
     return (f"fingers bend backwards beyond their limits in {frames} of {len(excess)} frames, worst {worst}",)

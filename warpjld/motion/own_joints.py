@@ -116,7 +116,7 @@ def _placed(
         local = np.linalg.inv(theirs[:, parents[k]]) @ theirs[:, k]
         local[:, :3, 3] *= factor
         out[:, known[k]] = out[:, known[parents[k]]] @ local
-    note = "the animation's file has another rest pose: its joint transforms are applied to this rig's bones"
+    note = "the animation's file shows another rest pose: its joints' transforms are played on this rig's bones"
     return out, [note]
 
 
@@ -176,4 +176,6 @@ def _merged(rig: Rig, worlds: NDArray[np.float64], match: NDArray[np.int64], tur
     if not told:
         return []
     shown = first_few([text for _, text in sorted(told, reverse=True)])
-    return [f"the animation rotates joints that are not in this skeleton; their flesh does not follow: {shown}"]
+    return [
+        f"the animation turns joints that are none of this skeleton, and what flesh they have does not follow: {shown}"
+    ]

@@ -61,7 +61,7 @@ def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Land
         up, lies = _up(clip, ways)
         frame = _most_like_standing(marks, clip.positions, up)
         clip = clip.rebased(frame, _turns(marks, clip.positions[frame], up))
-        notes = (f"the motion's rest pose is no pose of a body ({why}): its frame {frame} is used as rest pose",)
+        notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
         marks = _sided_landmarks(clip, side)
         return clip, marks, (*marks.notes, *notes, *lies)
     turn, told = turn_of_rest(clip, marks)
@@ -82,7 +82,7 @@ def _sided_landmarks(clip: Clip, side: str | None) -> Landmarks:
         return marks
     other = {"left": "right", "right": "left"}
     joints = {".".join([other.get(p, p) for p in name.split(".")]): joint for name, joint in marks.joints.items()}
-    doubt = "in the recording, feet point backwards if left and right are as named: left and right are exchanged"
+    doubt = "in the recording, feet point backwards where left and right are what its names say: they are exchanged"
     return replace(marks, joints=joints, doubts=(*marks.doubts, doubt))
 
 
@@ -121,7 +121,7 @@ def _arbitrary(clip: Clip, marks: Landmarks) -> str:
     if trunk is not None and not np.linalg.norm(trunk):
         return "its bones have no length"
     if _inconsistent(clip, marks):
-        return "the joints in the frames are placed differently"
+        return "the joints of the frames are placed otherwise"
     if thighs is not None:
         if _degrees(thighs[0], thighs[1]) > 120.0:
             return "its legs point apart"
@@ -231,13 +231,13 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
         return None, ()
     told = f"stands along {_axis_name(own)} in its rest and along {_axis_name(found)} in its frames"
     if not _stands(clip.positions, found, own):
-        return None, (f"the recorded figure {told}: it is assumed to lie, not to stand",)
+        return None, (f"the recorded figure {told}: it is taken to lie, not to stand",)
     turn = minimal_rotation(own, found)
     if own @ found < -0.5:  # upside down: the rotation axis follows from the frames
         mean_turn = transform.Rotation.from_quat(clip.rotations[:, pelvis]).mean()
         fitting = [g for g in transform.Rotation.create_group("O") if g.apply(own) @ found > 0.5]
         turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
-    return turn, (f"the recorded figure {told}: the latter is used as up axis",)
+    return turn, (f"the recorded figure {told}: the latter is taken as up",)
 
 
 def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
@@ -252,7 +252,7 @@ def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tup
     if found @ y > 0.5 or not floors or _stands(clip.positions, found, floors[0]):
         return found, ()
     told = f"the recorded figure is along {_axis_name(found)} in its frames, on a floor across {_axis_name(floors[0])}"
-    return floors[0], (f"{told}: it is assumed not to stand",)
+    return floors[0], (f"{told}: it is taken not to stand, but to lie or the like",)
 
 
 def _stands(places: NDArray[np.float64], up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

@@ -57,7 +57,7 @@ def grasp_by_both(scene: Scene, prop: Prop, first: float, last: float, tries: in
         key_grip(scene, actor, own, (first, middle, last))
         others = collisions(scene, actor, prop, first, last)
         message = f"the best of {own.tried} placements of two hands: {len(own.touching)} digits touch"
-        message += "".join(f"; {note}" for note in others)
+        message += "".join(f"; {told}" for told in others)
         values = {
             "posture": own.posture,
             "score": round(own.score, 4),
