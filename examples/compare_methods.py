@@ -1,5 +1,5 @@
-"""Four ways to cover one skeleton, as figures and pictures: LBS and dual quaternions by painted weights, JLD with its
-default parameters and calibrated to the rig.
+"""Compare four methods of deforming one rig, in numbers and pictures: LBS and dual quaternions with painted weights,
+JLD with default parameters and calibrated to the rig.
 
 python examples/compare_methods.py RIG [-o FOLDER] [--parameters FILE] [--tables-only]
 """

@@ -1,14 +1,14 @@
-"""A fingertip of the built-in hand pressed on a plate to 5 N: force, displacement and contact area, as people's are.
+"""A fingertip of the built-in hand pressed on a plate to 5 N: force, displacement and area, compared with people.
 
 python examples/fingertip.py [folder] [spacing in mm] [angle between plate and finger in degrees]
 
-Written: a plot over what was measured on people, its numbers as a table, and a picture of the pressed fingertip.
+Writes a plot over measurements on people, its numbers as a table, and a picture of the pressed fingertip.
 
-What stands for people, and where it is from:
+Measurements on people:
 - a plate at 20° to 40°, force exponential in displacement up to 2 N: Pawluk and Howe 1999, doi:10.1115/1.2800860;
 - 1 N at 1.5 to 2 mm, then 3.5 N/mm or more: Serina et al. 1997, from memory;
-- contact areas were measured from 0.25 to 7 N (Serina et al. 1998, doi:10.1016/S0021-9290(98)00067-0); no figures of
-  theirs are at hand, so only the range is shown.
+- contact areas were measured from 0.25 to 7 N (Serina et al. 1998, doi:10.1016/S0021-9290(98)00067-0); their numbers
+  are not available here, so only the range is shown.
 """
 
 import csv

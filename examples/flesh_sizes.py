@@ -2,8 +2,8 @@
 
 python examples/flesh_sizes.py [sizes in mm …]
 
-Printed: a table of the elements' size, their number, and force, area and peak pressure half-way and at the end of
-``press_plate.jld``, with what is said of elements that are too large.
+Prints a table of the size and number of elements, and force, area and peak pressure half-way and at the end of
+``press_plate.jld``, with the message about elements that are too large.
 """
 
 import sys

@@ -1,11 +1,11 @@
-"""Hands take objects by themselves: a table of every grasp, and pictures of it.
+"""Find grasps of several hands on several objects automatically: a table of all grasps, and pictures.
 
 python examples/grasp_objects.py FOLDER [STUDY.toml]
 
-The study names hands, objects, friction, seed and how many placements each grasp is the best of (wrist.best_of); by
-default a built-in hand takes a ball, a box, a glass and a plate. Written into FOLDER: grasps.md and a picture a hand,
-a row an object. A grasp counts where it is force closed and hand and object are nowhere more than 1 mm in one another,
-seen from both sides.
+The study names hands, objects, friction, seed and the number of placements of which each grasp is the best
+(wrist.best_of); by default a built-in hand grasps a ball, a box, a glass and a plate. Writes grasps.md into FOLDER, and
+a picture per hand, with a row per object. A grasp holds if it is force closed and the penetration is at most 1 mm: of
+the skin into the object, and of the object into the skin.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""A hand that was digitised half closed opens flat: the angles of its rest pose are given (A §3, R25).
+"""A hand that was digitised half closed is opened flat: the angles of its rest pose are given (A §3, R25).
 
 python examples/half_closed.py out
 """

@@ -1,8 +1,8 @@
-"""Flesh between skin and bones: a hand meshed with hexahedra, its bones held, gravity turned sideways.
+"""Flesh between skin and bones under gravity: a hand meshed with hexahedra, its bones fixed, gravity acting sideways.
 
 python examples/hand_gravity.py [RIG] [folder] [spacing in mm]
 
-RIG is a rig file, or builtin:left. Written: a picture, a VTK file, and the sagging skin in the rig's own topology.
+RIG is a rig file, or builtin:left. Writes a picture, a VTK file, and the sagging skin in the rig's own topology.
 """
 
 import sys

@@ -1,9 +1,9 @@
-"""Two soft pads squeeze a block: how gently may they, so that it does not fall? And what do they feel?
+"""Two soft pads squeeze a block: the gentlest grip at which it does not fall, and the readings of the pads.
 
 python examples/hold_block.py [folder] [weight in N] [friction]
 
-Written: what the pads feel while they close and while the weight comes on, as a plot and as a table, and a picture of
-the block held. Each pad has to press with weight / (2 × friction): that is known, and found here by closing the pads.
+Writes the readings of the pads while they close and while the weight is applied, as a plot and a table, and a picture
+of the block held. The exact force of each pad is weight / (2 × friction); here it is found by closing the pads.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""A hand in three meshes, fingers, palm and a cuff sewn to the wrist, stays in one piece by both methods (A §3, R18).
+"""A hand of three meshes (fingers, palm, a cuff joined to the wrist) stays in one piece with both methods (A §3, R18).
 
 python examples/pieces.py out
 """

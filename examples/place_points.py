@@ -1,4 +1,4 @@
-"""The 25 points of a hand, proposed in its bare surface, and the hand animated by them (B §2.1, R12).
+"""The 25 points of a hand, proposed from its surface alone, and the hand animated by them (B §2.1, R12).
 
 python examples/place_points.py out
 """

@@ -1,4 +1,4 @@
-"""The library without scripts: build a hand, bend a finger, cover it, write the surface.
+"""The library without scripts: build a hand, bend a finger, deform the skin, write the surface.
 
 python examples/python_api.py [folder]
 """

@@ -1,4 +1,4 @@
-"""A fingertip presses on a plate, in Python: how hard, over what area, and what the finger's muscles can do.
+"""A fingertip presses on a plate, in Python: force, contact area, and the share of the finger's muscle force.
 
 python examples/python_contact.py
 """

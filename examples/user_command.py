@@ -1,4 +1,4 @@
-"""A command of one's own in a few lines of Python: GRIP bends all fingers of a hand by a share of a fist.
+"""A user-defined command in a few lines of Python: GRIP bends all fingers of a hand to a percentage of a fist.
 
     warpjld run examples/user_command.jld --commands examples/user_command.py
 

@@ -21,7 +21,7 @@ QUESTIONS = {
     "unit has INFLATION": ("reference/scripts.md", r"`INFLATION` \|.*\| none: share of"),
     "with friction": ("reference/scripts.md", r"^FRICTION LEFT BALL 0\.6"),
     "not recognised": ("how-to/own-rig.md", r"warpjld inspect RIG --write-map map\.json"),
-    "contact.csv": ("reference/tables.md", r"`area_mm2`, `peak_kpa` \| area under pressure"),
+    "contact.csv": ("reference/tables.md", r"`area_mm2`, `peak_kpa` \| area under pressure \[mm²\]"),
     "study on a cluster": ("how-to/cluster.md", r"warpjld study study\.toml -o out --ray first:6379"),
     "grasps scored": ("explanation/metrics.md", r"\*\*score\*\* \[N\]: epsilon plus 0\.01 N"),
     "not do": ("explanation/limits.md", r"face editor"),

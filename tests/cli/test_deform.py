@@ -62,7 +62,7 @@ def test_some_frames_at_another_rate(place: Path, capsys: pytest.CaptureFixture[
 def test_held_in_betweens_are_noted(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (place / "curl.csv").write_text("frame,index.base.flexion\n0,0\n10,90\n20,89\n30,0\n")
     run("finger.glb", "--motion", "curl.csv", "-o", "curl.npz")
-    assert "note: left.index.base.flexion: in-betweens of frames 11 to" in capsys.readouterr().out
+    assert "note: left.index.base.flexion: interpolated values from frame 11 to" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

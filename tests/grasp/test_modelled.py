@@ -52,7 +52,7 @@ def test_soft_objects() -> None:
         (lambda: revolved([(0.0, 0.0), (0.0, 1.0)]), "encloses nothing"),
         (lambda: revolved([(0.1, 0.0), (0.1, 0.0)]), "two points or more"),
         (lambda: swept([(0, 0), (1, 1), (1, 0), (0, 1)], [(0, 0, 0), (0, 0, 1)]), "crosses itself"),
-        (lambda: swept([(0, 0), (1, 1), (1, 0)], [(0, 0, 0)]), "a path wants two points"),
+        (lambda: swept([(0, 0), (1, 1), (1, 0)], [(0, 0, 0)]), "a path needs two points"),
         (lambda: soft([(0.0, 0.0, 0.0)], [0.0]), "radii above 0"),
         (lambda: soft([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], [1e-4, 0.1]), "too small"),
     ],

@@ -272,7 +272,7 @@ def test_joints_may_bend_together(covering) -> None:
         ({"distance": np.nan}, "distance is not finite"),
         ({"rate": np.inf}, "rate and stop must be finite"),
         ({"vertex": [1, 2], "facet": [1, 2, 3]}, "one value or one for each"),
-        ({"joint": []}, r"joint wants shape .* got \(0, 1\)"),
+        ({"joint": []}, r"joint needs shape .* got \(0, 1\)"),
         ({"vertex": []}, "want at least one"),
     ],
 )

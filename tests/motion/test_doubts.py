@@ -95,5 +95,5 @@ def test_real_recordings_are_not_suspected_of_flips(data: Path, name: str) -> No
 def test_far_guesses_are_said(tmp_path: Path) -> None:
     arms = replace(MIXAMO, names={part: name for part, name in MIXAMO.names.items() if "Leg" not in name})
     moved = play(tmp_path, record(arms, frames=CALM))
-    assert any("share no legs: how far it travels is guessed" in note for note in moved.notes)
+    assert any("have no legs in common: the scale of its travel is estimated" in note for note in moved.notes)
     assert any("not in the recording, these follow the joint above them: left.hip" in note for note in moved.notes)

@@ -127,7 +127,7 @@ def test_sides_that_make_no_sense_are_refused(tmp_path: Path) -> None:
     poses = webxr_poses(skeleton, "left", postures(skeleton, "left", ("flat", "fist")), ("flat", "fist"))
     with pytest.raises(InputError, match=r"handedness of the file: want left or right, got 'both'"):
         read_hands(save(tmp_path, {"handedness": "both", **poses}))
-    with pytest.raises(InputError, match=r"pose 'fist' does not say which hand it is of, others do"):
+    with pytest.raises(InputError, match=r"pose 'fist' does not state its hand, but others do"):
         read_hands(save(tmp_path, {"flat": {"handedness": "left", **poses["flat"]}, "fist": poses["fist"]}))
 
 

@@ -238,7 +238,7 @@ def test_mistakes_in_recordings_are_named(tmp_path: Path) -> None:
         only_hand(save(tmp_path, broken))
     broken = leap(skeleton, poses, packed=False)
     broken["frames"][1]["pointables"][1]["tipPosition"] = [1, 2]
-    with pytest.raises(InputError, match=r"'index.tip' wants three finite coordinates"):
+    with pytest.raises(InputError, match=r"'index.tip' needs three finite coordinates"):
         only_hand(save(tmp_path, broken))
     broken = leap(skeleton, poses, packed=True)
     broken["frames"][2][1] = 5

@@ -194,7 +194,7 @@ def test_flickering_labels_are_one_hand(tmp_path: Path) -> None:
     ]
     (one,) = (recording := read_hands(save(tmp_path, {"fps": 9, "frames": frames}))).hands
     assert (one.side, len(one.times)) == ("right", 2 * len(NAMES))
-    assert "in 1 frames the other: taken for right" in recording.notes[0]
+    assert "in 1 frames the other: read as right" in recording.notes[0]
 
 
 @pytest.mark.parametrize(

@@ -111,5 +111,5 @@ def test_bad_keys_are_explained(times: list, key_values: list, message: str) -> 
 
 
 def test_wrong_number_of_constants() -> None:
-    with pytest.raises(InputError, match="tension wants one finite number or 2"):
+    with pytest.raises(InputError, match="tension needs one finite number or 2"):
         Spline([0, 1], [0, 1], tension=[0, 0, 0])

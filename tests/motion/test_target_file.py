@@ -77,7 +77,7 @@ def test_poses_of_a_motion_file(rig: Rig, tmp_path: Path) -> None:
         ({"channels": np.array([1.0, 2.0, 3.0])}, "'channels': want text"),
         ({"channels": np.array(["index.base.flexion", "elbow.flexion", "root.y"])}, "elbow"),
         ({"channels": np.array(["index.base.flexion", "index.base.bend", "root.y"])}, "no angle 'bend'"),
-        ({"channels": NAMES[[0, 0, 2]]}, "'index.base.flexion' stands twice"),
+        ({"channels": NAMES[[0, 0, 2]]}, "'index.base.flexion' is listed twice"),
         ({"angles": None}, "no array 'angles'"),
         ({"angles": ANGLES[:1]}, r"'angles': want shape \(2, 3\)"),
         ({"angles": np.where(ANGLES == 30.0, np.nan, ANGLES)}, "index.base.flexion is not finite at frame 0"),

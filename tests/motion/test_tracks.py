@@ -95,7 +95,7 @@ def test_in_betweens_beyond_a_limit_are_held_and_reported() -> None:
     angles, _ = motion.sample(motion.frames, skeleton)
     assert np.degrees(angles[:, joint, 0]).max() == pytest.approx(100, abs=1e-9)
     (report,) = motion.clamped(motion.frames, skeleton)
-    assert str(report).startswith("left.index.knuckle2.flexion: in-betweens of frames 11 to ")
+    assert str(report).startswith("left.index.knuckle2.flexion: interpolated values from frame 11 to ")
     assert "limit of 100°" in str(report)
 
 

@@ -111,7 +111,7 @@ def test_an_actor_has_its_colour(tmp_path: Path) -> None:
         ("SHOT A 5 3", "must not come before the first"),
         ("SHOT A 0 3\nSHOT A 4 5", "a shot A already"),
         ("SHOT A 0 5\nSHOT B 3 8\nFILM 'a.mp4' SHOTS A B", "shot B begins at frame 3, before A has ended"),
-        ("FILM 'a.mp4' SHOTS A", "SHOTS wants names of shots; there are none"),
+        ("FILM 'a.mp4' SHOTS A", "SHOTS needs names of shots; there are none"),
         ("LIGHT A SPOT FROM 0 0 1", "the kind of lamp"),
         ("LIGHT A KEY FROM 0 0 0", "cannot shine at its own place"),
         ("BACKDROP 'octarine'", "no colour 'octarine'"),

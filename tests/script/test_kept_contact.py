@@ -69,7 +69,7 @@ def test_what_is_solved_is_kept_where_an_output_fails(
         scene = scene_of(tmp_path, "PRESS 0 4", "PICTURE 2 'p.png'")
         with pytest.raises(WarpjldError, match=r"not made: 'p\.png'"):
             run_scene(scene, tmp_path / "out")
-    assert f'with STATE "{KEPT}" it is exported again' in scene.warnings[-1]
+    assert f'PRESS … STATE "{KEPT}" exports them' in scene.warnings[-1]
     again = scene_of(tmp_path, f"PRESS 0 4 STATE '{KEPT}'", "PICTURE 2 'p.png'", "EXPORT 'e.npz'")
     monkeypatch.setattr("warpjld.simulation.solve_frames._Run.solve", refuse)  # nothing is solved again
     run_scene(again, tmp_path / "out")

@@ -31,7 +31,7 @@ def test_the_motion_on_the_stage_is_written(run, tmp_path) -> None:
     assert len(worlds) == len(poses) == 5
     own = [names.index(name) for name in actor.skeleton.names]
     np.testing.assert_allclose(worlds[:, own][..., :3, 3], poses.positions, atol=1e-6)
-    assert "sub/a.bvh: BVH does not number its frames: the first one is frame 2" in summary["notes"]
+    assert "sub/a.bvh: BVH has no frame numbers: the first frame is frame 2" in summary["notes"]
 
 
 def test_each_actor_has_a_file_of_its_own(run, tmp_path) -> None:

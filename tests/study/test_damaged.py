@@ -40,7 +40,7 @@ def test_damaged_trials_run_again_and_it_is_said(done: Path, damage: str) -> Non
     file.write_text(json.dumps(content))
     again = run_study(Dice(trials=4), done, processes=1, table="csv")
     assert again.ran == 1
-    assert "1 trials kept in" in again.notes[0]
+    assert "1 trials in" in again.notes[0]
     assert again.notes[0].endswith("are damaged and run again: 3")
     assert (done / "table.csv").read_bytes() == before
 

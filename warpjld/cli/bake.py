@@ -117,7 +117,7 @@ def bake_command(
         make_folder(table.parent)
         write_report(table, rows)
     warn(dict.fromkeys([*warnings, *written.warnings]))
-    told = {
+    summary = {
         "rig": rig,
         "files": [str(path) for path in outputs],
         "influences": int(influences),
@@ -128,15 +128,15 @@ def bake_command(
         "notes": list(written.notes),
     }
     if as_json:
-        answer(told)
+        answer(summary)
     elif not quiet:
-        _print(told, rows)
+        _print(summary, rows)
 
 
-def _print(told: dict[str, Any], rows: list[Accuracy]) -> None:
-    _table(rows, told["poses"])
-    click.echo(f"{', '.join(told['files'])} written")
-    for note in told["notes"]:
+def _print(summary: dict[str, Any], rows: list[Accuracy]) -> None:
+    _table(rows, summary["poses"])
+    click.echo(f"{', '.join(summary['files'])} written")
+    for note in summary["notes"]:
         click.echo(f"note: {note}")
 
 

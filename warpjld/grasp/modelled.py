@@ -81,7 +81,7 @@ def swept(profile: ArrayLike, path: ArrayLike, *, name: str = "swept") -> GraspO
     if np.linalg.norm(points[0] - points[-1]) < _SAME:
         points = points[:-1]
     if len(points) < 3:
-        raise InputError(f"{name}: an outline wants three points or more, got {len(points)}")
+        raise InputError(f"{name}: an outline needs three points or more, got {len(points)}")
     loop = np.concatenate([points, points[:1]])
     _refuse_crossing(loop, name)
     rows = _finer(loop)[:-1]
@@ -140,10 +140,10 @@ def _profile(profile: ArrayLike, name: str) -> NDArray[np.float64]:
     """
     points = np.asarray(profile, np.float64)
     if points.ndim != 2 or points.shape[1:] != (2,) or not np.isfinite(points).all():
-        raise InputError(f"{name}: a profile wants points of two finite numbers each, got {points.shape}")
+        raise InputError(f"{name}: a profile needs points of two finite numbers each, got {points.shape}")
     points = points[np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME)]
     if len(points) < 2:
-        raise InputError(f"{name}: a profile wants two points or more that differ, got {len(points)}")
+        raise InputError(f"{name}: a profile needs two points or more that differ, got {len(points)}")
     return points
 
 
@@ -183,10 +183,10 @@ def _path(path: ArrayLike, name: str) -> tuple[NDArray[np.float64], bool]:
 
     points = np.asarray(path, np.float64)
     if points.ndim != 2 or points.shape[1:] != (3,) or not np.isfinite(points).all():
-        raise InputError(f"{name}: a path wants points of three finite numbers each, got {points.shape}")
+        raise InputError(f"{name}: a path needs points of three finite numbers each, got {points.shape}")
     points = points[np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME)]
     if len(points) < 2:
-        raise InputError(f"{name}: a path wants two points or more that differ, got {len(points)}")
+        raise InputError(f"{name}: a path needs two points or more that differ, got {len(points)}")
     closed = len(points) > 3 and bool(np.linalg.norm(points[0] - points[-1]) < _SAME)
     if len(points) == 2:
         return _finer(points), False

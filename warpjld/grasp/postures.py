@@ -15,21 +15,21 @@ __all__ = ["AHEAD", "CLOSING", "POSTURES", "posture_angles", "posture_for"]
 _FINGERS = ("index", "middle", "ring", "pinky")
 
 POSTURES: dict[str, dict[str, dict[str, float]]] = {
-    # round things: fingers spread, thumb against the middle finger
+    # round objects: fingers spread, thumb against the middle finger
     "sphere": {
         "thumb.base": {"pivot": 30, "abduction": 20, "flexion": -10},
         "index.base": {"abduction": 10},
         "ring.base": {"abduction": -8},
         "pinky.base": {"abduction": -18},
     },
-    # long things across the palm: fingers side by side, thumb round the other side
+    # long objects across the palm: fingers side by side, thumb round the other side
     "cylinder": {
         "thumb.base": {"pivot": 35, "abduction": 10, "flexion": -15},
         "index.base": {"abduction": 5},
         "ring.base": {"abduction": -4},
         "pinky.base": {"abduction": -10},
     },
-    # small things: thumb, index and middle finger only
+    # small objects: thumb, index and middle finger only
     "pinch": {
         "thumb.base": {"pivot": 35, "abduction": 15, "flexion": -15},
         "index.base": {"abduction": 3, "flexion": 15},
@@ -37,7 +37,7 @@ POSTURES: dict[str, dict[str, dict[str, float]]] = {
         "ring.base": {"abduction": -6},
         "pinky.base": {"abduction": -14},
     },
-    # thin things: fingers flat on one side, bent at their bases only, thumb on the other
+    # thin objects: fingers flat on one side, bent at their bases only, thumb on the other
     "plate": {
         "thumb.base": {"pivot": 40, "abduction": 25, "flexion": -15},
         "index.base": {"abduction": 5, "flexion": 25},

@@ -110,7 +110,7 @@ def search_rows(
         shapes = [np.shape(v) for v in (*fields.values(), searches.distance)]
         (count,) = np.broadcast_shapes(*shapes, (len(joints),), (1,))
     except ValueError:
-        raise InputError("searches: every field wants one value or one for each search") from None
+        raise InputError("searches: every field needs one value or one for each search") from None
     if not count:
         raise InputError("searches: want at least one")
     columns = {name: np.broadcast_to(np.asarray(v, dtype=np.int64), count) for name, v in fields.items()}
@@ -138,7 +138,7 @@ def _chain_columns(searches: Searches, joint_count: int) -> tuple[NDArray, NDArr
     joints = np.asarray(searches.joint, dtype=np.int64)
     joints = joints.reshape(-1, 1) if joints.ndim < 2 else joints
     if joints.ndim != 2 or not joints.size or joints.shape[1] > _MOST_JOINTS:
-        raise InputError(f"searches: joint wants shape (N,) or (N, up to {_MOST_JOINTS}), got {joints.shape}")
+        raise InputError(f"searches: joint needs shape (N,) or (N, up to {_MOST_JOINTS}), got {joints.shape}")
     if joints.max() >= joint_count or joints.min() < -1 or joints[:, 0].min() < 0:
         raise InputError(f"searches: joint must lie in 0…{joint_count - 1}")
     rate = np.asarray(searches.rate, dtype=np.float64)

@@ -32,7 +32,7 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     except (ValueError, RuntimeError) as error:
         if "pickle" in str(error).lower() or "object" in str(error).lower():
             raise InputError(
-                "holds pickled Python objects, which may run any code: not read; save plain arrays of numbers or text",
+                "contains pickled Python objects, which may run any code, and is not read; save plain arrays",
                 path=path,
             ) from None
         raise InputError(f"is not a NumPy file of arrays ({error})", path=path) from None
@@ -60,7 +60,7 @@ def _member(file: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
         if kind.hasobject:
             raise ValueError("pickled objects")
         if int(np.prod([int(n) for n in shape], dtype=object)) * kind.itemsize > member.file_size:
-            raise ValueError(f"'{member.filename}' announces more than it holds")
+            raise ValueError(f"'{member.filename}' is shorter than its header states")
     with file.open(member) as stream:
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
     return array

@@ -167,7 +167,7 @@ def _number(cell: str, marks: dict[str, int], path: str | Path, line: int, colum
         if mark in text:
             marks.setdefault(mark, line)
     if ("." in text and "," in text) or text.count(",") > 1:
-        raise InputError(f"'{text}': thousands are not separated in numbers", path=path, line=line, column=column)
+        raise InputError(f"'{text}': want numbers without thousands separators", path=path, line=line, column=column)
     if len(marks) > 1:
         other = marks["." if "," in text else ","]
         what = "a decimal comma" if "," in text else "a decimal point"

@@ -103,7 +103,7 @@ def _coordinates(joint: str, rows: list[list[float]]) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         array = np.empty(0)
     if array.shape != (len(rows), 3) or not np.isfinite(array).all():
-        raise InputError(f"'{joint}' wants three finite coordinates in every frame")
+        raise InputError(f"'{joint}' needs three finite coordinates in every frame")
     return array
 
 

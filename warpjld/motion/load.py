@@ -105,7 +105,7 @@ def load_motion(
     suffix = path.suffix.lower()
     if suffix in (".pkl", ".pickle"):
         raise InputError(
-            "pickled Python objects may run any code: not read; save plain arrays as .npz, or JSON", path=path
+            "is a pickle, which may run any code, and is not read; save plain arrays as .npz, or JSON", path=path
         )
     if suffix not in MOTION_FORMATS:
         known = ", ".join(f"{s} ({what})" for s, what in MOTION_FORMATS.items())
@@ -202,7 +202,7 @@ def _capture(path: Path, rig: Rig, rate: float | None) -> LoadedMotion:
     flips = jumps(clip)
     if recording is None or own is None:
         return _retargeted(clip, rig, rate, flips)
-    note = "the recording is of the rig's own joints: they are moved as it says"
+    note = "the recording is of the rig's own joints: their motion is used directly"
     warnings = (
         *clip.warnings,
         *own.warnings,

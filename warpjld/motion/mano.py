@@ -223,7 +223,7 @@ def _flat(found: Fields, given: bool | None, warnings: list[str]) -> bool:
             "in the file (a field flat_hand_mean, true or false) or as an option"
         )
     if stated is not None and given is not None and bool(stated) != given:
-        warnings.append(f"the file states flat_hand_mean {bool(stated)}: read as {given}, as asked for")
+        warnings.append(f"the file states flat_hand_mean {bool(stated)}: read as {given}, as requested")
     return bool(stated) if given is None else given
 
 

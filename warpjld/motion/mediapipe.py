@@ -99,7 +99,7 @@ def _hands(
     if _in_image(seen):
         if size is None:
             notes.append(
-                "landmarks in parts of an image whose size the file does not state (image_size): taken as square"
+                "landmarks in parts of an image whose size the file does not state (image_size): assumed square"
             )
         else:
             scale = np.array([size[0], size[1], size[0]])

@@ -322,8 +322,8 @@ def _scale(source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int
     scale = sum(b for _, b in known) / sum(a for a, _ in known) if known else 1.0
     if legs and known:
         return scale, ()
-    told = "by the other bones that both have" if known else "as 1 to 1, for no bone tells"
-    return scale, (f"the recording and the rig share no legs: how far it travels is guessed {told}",)
+    told = "from the other bones in common" if known else "as 1, since they have no bone in common"
+    return scale, (f"the recording and the rig have no legs in common: the scale of its travel is estimated {told}",)
 
 
 def _some(names: tuple[str, ...]) -> str:

@@ -120,5 +120,5 @@ def _one_label(seen: list[list[SeenHand]], notes: list[str]) -> list[list[SeenHa
     (most, _), (_, fewer) = labels.most_common()
     if fewer > _FEW * sum(labels.values()):
         return seen
-    notes.append(f"a hand that is always alone is called {most}, but in {fewer} frames the other: taken for {most}")
+    notes.append(f"a hand that is always alone is called {most}, but in {fewer} frames the other: read as {most}")
     return [[replace(one, side=most) for one in hands] for hands in seen]

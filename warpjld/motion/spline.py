@@ -90,7 +90,7 @@ class Spline:
 def _per_key(name: str, constant: ArrayLike, count: int) -> NDArray[np.float64]:
     array = np.asarray(constant, dtype=np.float64)
     if array.shape not in ((), (count,)) or not np.isfinite(array).all():
-        raise InputError(f"spline: {name} wants one finite number or {count}, got shape {array.shape}")
+        raise InputError(f"spline: {name} needs one finite number or {count}, got shape {array.shape}")
     return np.broadcast_to(array, count)
 
 

@@ -49,7 +49,7 @@ def stated_times(
             unit, name = (
                 (1.0, "seconds") if step < 2.0 else (1e-3, "milliseconds") if step < 2e3 else (1e-6, "microseconds")
             )
-            notes.append(f"timestamps {step:.4g} apart are taken for {name}")
+            notes.append(f"timestamps {step:.4g} apart are read as {name}")
         times = (stamps - stamps[0]) * unit
         return times, round((count - 1) / float(times[-1]), 1) or float(1.0 / times[-1])
     stated = next((about[key] for key in _RATES if key in about), None)
@@ -59,7 +59,7 @@ def stated_times(
             raise InputError(f"want frames a second, above 0, got {stated}")
         return np.arange(count) / value, value
     if rate is None and count > 1:
-        notes.append(f"the file does not state its rate: taken as {DEFAULT_RATE:g} frames a second (--rate to change)")
+        notes.append(f"the file does not state its rate: assumed {DEFAULT_RATE:g} frames a second (--rate to change)")
     value = DEFAULT_RATE if rate is None else rate
     return np.arange(count) / value, value
 

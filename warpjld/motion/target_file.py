@@ -66,7 +66,7 @@ def read_targets(path: str | Path, rig: Rig, *, motion: str | Path | None = None
         if motion is None:
             return Targets(_poses(arrays, len(vertices), rig), vertices)
     if "channels" in arrays or "angles" in arrays:
-        raise InputError(f"has poses of its own: no motion file is wanted beside them, got {motion}", path=path)
+        raise InputError(f"has poses of its own: want no motion file beside it, got {motion}", path=path)
     loaded = load_motion(motion, rig)
     if len(loaded.poses) != len(vertices):
         raise InputError(f"has {len(loaded.poses)} frames for {len(vertices)} target shapes", path=motion)
@@ -99,7 +99,7 @@ def _poses(arrays: dict[str, NDArray], frames: int, rig: Rig) -> Poses:
         raise InputError(f"'angles': want shape ({frames}, {len(channels)}), shapes and channels, got {angles.shape}")
     named = [name.strip().lower() for name in channels.tolist()]
     if twice := [name for name in named if named.count(name) > 1]:
-        raise InputError(f"'channels': '{twice[0]}' stands twice")
+        raise InputError(f"'channels': '{twice[0]}' is listed twice")
     motion = Motion(span=(0.0, float(frames - 1)))
     for column, name in enumerate(named):
         moves = name in ROOT_CHANNELS

@@ -86,8 +86,8 @@ class Clamped:
     def __str__(self) -> str:
         first, last = self.frames
         return (
-            f"{self.channel}: in-betweens of frames {first:g} to {last:g} reach {np.degrees(self.worst):.4g}°; "
-            f"held at the limit of {np.degrees(self.limit):.4g}°"
+            f"{self.channel}: interpolated values from frame {first:g} to {last:g} reach {np.degrees(self.worst):.4g}"
+            f"°; held at the limit of {np.degrees(self.limit):.4g}°"
         )
 
 

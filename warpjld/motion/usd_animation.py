@@ -135,7 +135,7 @@ def _chosen(
     """Title, the SkelAnimation of every skeleton (or None), and notes."""
     animations = _animations(file, skeletons)
     if not animations:
-        raise InputError("no animation in this file: its skeleton rests", path=file.path)
+        raise InputError("no animation in this file: its skeleton is not animated", path=file.path)
     bound = [one.animation for one in skeletons]
     played = {title: paths for title, paths in animations.items() if {str(p.GetPath()) for p in bound if p} & paths}
     if name is None and len(played) > 1:
@@ -149,7 +149,7 @@ def _chosen(
     fitting = [prim if joints & set(one.tokens) else None for one in skeletons]
     if not any(fitting):
         raise InputError(f"animation '{title}' moves no joint of its skeleton", path=file.path)
-    return title, fitting, (*notes, f"animation '{title}' is bound to no skeleton: it is taken by its joints' names")
+    return title, fitting, (*notes, f"animation '{title}' is bound to no skeleton: its joints are matched by name")
 
 
 def _joints(animation: Any) -> list[str]:
@@ -162,7 +162,7 @@ def _shapes(chosen: list[Any]) -> list[str]:
     from pxr import UsdSkel
 
     moving = [p for p in chosen if p and UsdSkel.Animation(p).GetBlendShapeWeightsAttr().GetNumTimeSamples() > 1]
-    return ["the animation of blend shapes is not followed"] if moving else []
+    return ["the animation of blend shapes is ignored"] if moving else []
 
 
 def _time_codes(

@@ -63,7 +63,7 @@ def webxr_hands(content: Mapping[str, Any]) -> HandRecording:
         if None not in named.values():
             found = {s: {n: p for n, p in found[None].items() if named[n] == s} for s in dict.fromkeys(named.values())}
     if None in found and len(found) > 1:
-        raise InputError(f"pose '{next(iter(found[None]))}' does not say which hand it is of, others do")
+        raise InputError(f"pose '{next(iter(found[None]))}' does not state its hand, but others do")
     return HandRecording(tuple(_track(side, poses) for side, poses in found.items()), 1.0)
 
 

@@ -62,7 +62,7 @@ def grasp_by_itself(
         f"the best of {found.tried} placements, posture {found.posture}: {len(found.touching)} digits touch; {inside}"
     )
     others = [*collisions(scene, actor, prop, first, last), *_through_body(scene, actor, covering, side, first, last)]
-    message += "".join(f"; {told}" for told in others)
+    message += "".join(f"; {note}" for note in others)
     values = {
         "posture": found.posture,
         "score": round(found.score, 4),

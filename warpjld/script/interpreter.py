@@ -180,7 +180,7 @@ class Interpreter:
         if len(values) != len(wanted):
             position = values[len(wanted)].position if len(values) > len(wanted) else statement.end
             syntax = " ".join([name, *(f"<{word}>" for word in wanted)])
-            raise position.error(f"macro {name} wants {len(wanted)} arguments, got {len(values)}; it is {syntax}")
+            raise position.error(f"macro {name} needs {len(wanted)} arguments, got {len(values)}; it is {syntax}")
         if self._depth >= _DEEPEST:
             raise here.error(f"macros call one another more than {_DEEPEST} deep: {name} never ends")
         bound = {word.text.upper(): value for word, value in zip(wanted, values, strict=True)}
@@ -283,7 +283,7 @@ def _evaluate(argument: Argument, bound: Mapping[str, Value]) -> Value:
     left, right = (_evaluate(side, bound) for side in (argument.left, argument.right))
     for side in (left, right):
         if not isinstance(side, Number):
-            raise argument.position.error(f"arithmetic wants numbers, got {side}")
+            raise argument.position.error(f"arithmetic needs numbers, got {side}")
     assert isinstance(left, Number)
     assert isinstance(right, Number)
     a, b = left.value, right.value

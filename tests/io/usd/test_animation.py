@@ -263,7 +263,7 @@ def vertex_cache(path: Path) -> Path:
 def test_no_animation_is_told_why(hand: Stage, tmp_path: Path) -> None:
     rig = load_rig(hand.write(tmp_path / "a.usda"))
     for path, message in (
-        (tmp_path / "a.usda", "no animation in this file: its skeleton rests"),
+        (tmp_path / "a.usda", "no animation in this file: its skeleton is not animated"),
         (vertex_cache(tmp_path / "b.usdc"), "is a vertex cache"),
         (bar(joints=None, keys=[]).write(tmp_path / "c.usda"), "no animation in this file"),
     ):

@@ -73,7 +73,7 @@ def test_several_roots_hang_on_one(hand: Rig, tmp_path: Path) -> None:
     flat = replace(hand, source=replace(hand.source, parents=np.full(len(hand.source), -1)))
     poses = turning(hand, 5)
     written = write_motion(tmp_path / "a.bvh", flat, poses, rate=30.0)
-    assert any("26 roots hang on 'root'" in note for note in written.notes)
+    assert any("26 roots are attached to 'root'" in note for note in written.notes)
     names, parents, _, worlds, _ = evaluate(tmp_path / "a.bvh")
     assert names[0] == "root"
     assert set(parents) == {-1, 0}

@@ -183,7 +183,7 @@ def test_shear_is_told(write_glb: Callable[..., Path], hand_glb: Callable[..., A
     poses = turning(rig, 3)
     written = write_motion(tmp_path / "out.glb", rig, poses, rate=25.0)
     assert len(written.warnings) == 1
-    assert "hang below one scaled by different factors" in written.warnings[0]
+    assert "are below one scaled by different factors" in written.warnings[0]
     content, _, worlds = evaluate(tmp_path / "out.glb")
     assert rig.source is not None
     nodes = [next(n for n, node in enumerate(content["nodes"]) if node["name"] == name) for name in rig.source.names]

@@ -222,7 +222,7 @@ def test_two_hands_are_not_one(rig: Rig) -> None:
     from warpjld.study.scoring.score import _Hands
 
     hands = _Hands((hand_choice("builtin:left"),))
-    with pytest.raises(InputError, match="grasps of a, b, but one hand is given"):
+    with pytest.raises(InputError, match="grasps of several hands, a, b, but one hand is given"):
         hands.check([GivenGrasp("1", "ball", hand="a"), GivenGrasp("2", "ball", hand="b")])
 
 

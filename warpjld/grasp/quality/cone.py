@@ -35,7 +35,7 @@ def friction_cone(contacts: Contacts, edges: int = 8) -> list[NDArray[np.float64
         InputError: Fewer than three edges.
     """
     if edges < 3:
-        raise InputError(f"edges: a friction cone wants 3 or more, got {edges}")
+        raise InputError(f"edges: a friction cone needs 3 or more, got {edges}")
     angles = 2.0 * np.pi * np.arange(edges) / edges
     cones = []
     for friction, spin in zip(contacts.friction, contacts.spin, strict=True):

@@ -59,7 +59,7 @@ def write_bvh(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMoti
             f"position channels besides the root's, where the distance to the parent changes: {first_few(stretched, 6)}"
         )
     if timing.start_frame:
-        notes.append(f"BVH does not number its frames: the first one is frame {timing.start_frame}")
+        notes.append(f"BVH has no frame numbers: the first frame is frame {timing.start_frame}")
     with path.open("w", encoding="utf-8", newline="\n") as file:
         _write_hierarchy(file, joints, moving)
         file.write(f"MOTION\nFrames: {len(motion)}\nFrame Time: {1.0 / timing.rate:.10g}\n")
@@ -77,7 +77,7 @@ def _hierarchy(motion: SourceMotion, rig: Rig, notes: list[str]) -> list[_Joint]
     if len(roots) > 1:
         common = next(name for name in ("root", *(f"root{n}" for n in range(len(names) + 1))) if name not in names)
         joints.append(_Joint(common, -1, -1, 0, np.zeros(3), None))
-        notes.append(f"BVH holds one hierarchy: {len(roots)} roots hang on '{common}', at the origin")
+        notes.append(f"BVH holds one hierarchy: {len(roots)} roots are attached to '{common}', at the origin")
     waiting = [(root, len(joints) - 1) for root in reversed(roots)]
     while waiting:
         source, parent = waiting.pop()
@@ -104,7 +104,7 @@ def _names(names: tuple[str, ...], notes: list[str]) -> list[str]:
         out.append(unique)
     changed = [f"'{old}' → {new}" for old, new in zip(names, out, strict=True) if old != new]
     if changed:
-        notes.append(f"names that BVH cannot hold: {first_few(changed, 6)}")
+        notes.append(f"names changed for BVH: {first_few(changed, 6)}")
     return out
 
 

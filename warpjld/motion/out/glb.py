@@ -102,8 +102,8 @@ def animate(
     bent = [motion.tree.names[j] for j in moved if sheared[j] > _SHEARED]
     if bent:
         warnings.append(
-            f"{len(bent)} joints hang below one scaled by different factors ({', '.join(bent[:4])}): glTF cannot hold "
-            f"the shear of their turns, up to {100 * sheared.max():.1f} % of their scale; their places are right"
+            f"{len(bent)} joints are below one scaled by different factors ({', '.join(bent[:4])}): glTF cannot hold "
+            f"the shear of their turns, up to {100 * sheared.max():.1f} % of their scale; their positions are exact"
         )
 
 

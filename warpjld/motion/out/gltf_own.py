@@ -92,7 +92,9 @@ def _take_in_pictures(file: GlbFile, folder: Path, warnings: list[str]) -> None:
         try:
             data = (folder / unquote(uri)).read_bytes()
         except OSError as error:
-            warnings.append(f"picture '{uri}' cannot be read ({error.strerror}): the file points at it, but lacks it")
+            warnings.append(
+                f"picture '{uri}' cannot be read ({error.strerror}): the output refers to it, but does not contain it"
+            )
             continue
         kind = picture.get("mimeType") or _MEDIA.get(Path(unquote(uri)).suffix.lower())
         if kind is None:

@@ -35,7 +35,7 @@ def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMot
     """
     sides = [side for side in ("left", "right") if f"{side}.wrist" in rig.skeleton.names]
     if not sides:
-        raise InputError("MANO's parameters are a hand's: this rig has none")
+        raise InputError("MANO parameters are those of a hand: this rig has none")
     fields: dict[str, NDArray[Any]] = {
         "joint_order": np.array(MANO_JOINTS),
         "fps": np.array(float(timing.rate)),

@@ -144,5 +144,5 @@ def _notes(rig: Rig) -> tuple[str, ...]:
     if carried:
         notes.append(f"joints that move rigidly with the one they belong to: {first_few(carried, 6)}")
     if still:
-        notes.append(f"joints above the recognised ones, which stay: {first_few(still, 6)}")
+        notes.append(f"joints above the recognised ones, which do not move: {first_few(still, 6)}")
     return tuple(notes)

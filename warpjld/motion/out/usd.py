@@ -78,8 +78,8 @@ def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSk
         raise OSError("USD could not save the layer")
     bent = [motion.tree.names[j] for j in np.flatnonzero(sheared > _SHEARED)]
     warning = (
-        f"{len(bent)} joints hang below one scaled by different factors ({', '.join(bent[:4])}): USD cannot hold the "
-        f"shear of their turns, up to {100 * sheared.max():.1f} % of their scale; their places are right"
+        f"{len(bent)} joints are below one scaled by different factors ({', '.join(bent[:4])}): USD cannot hold the "
+        f"shear of their turns, up to {100 * sheared.max():.1f} % of their scale; their positions are exact"
     )
     return WrittenMotion(tuple(notes), (warning,) if bent else ())
 

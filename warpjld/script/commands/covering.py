@@ -88,7 +88,7 @@ def domains(scene: Scene, arguments: Arguments) -> None:
     "TOUCH",
     syntax="TOUCH <ON/OFF/LIMIT>",
     help=(
-        "Push skin out of other skin and out of objects, for display only (PRESS solves contact); "
+        "Push skin out of other skin and objects, for display only (PRESS solves contact); "
         "LIMIT: digits also stop where they touch."
     ),
     group="Covering",

@@ -52,7 +52,7 @@ def print_(scene: Scene, arguments: Arguments) -> None:
         "SHOW VALUES <frame>, SHOW <WIREFRAME/SHADED> <frame>, SHOW DISTANCE <frame> <hand vertex> <object> <facet>, "
         "SHOW INTERSECTION <frame> <segment> <object> or SHOW <ACTORS/JOINTS/PARAMETERS/OUTPUTS>"
     ),
-    help="Print joint values at a frame, make a picture of it, measure a distance or an intersection, or list things.",
+    help="Print joint values at a frame, make a picture of it, measure a distance or an intersection, or list names.",
     group="Flow",
 )
 def show_(scene: Scene, arguments: Arguments) -> None:

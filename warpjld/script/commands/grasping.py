@@ -72,8 +72,8 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
         "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>], or GRASP <key1> <key2> BOTH <object> AUTO "
         "[TRIES <placements>]"
     ),
-    help="Close digits on an object between key1 and key2; COUPLING flexes joints together; AUTO also finds where to "
-    "place the hand; BOTH uses two hands.",
+    help="Close digits on an object between key1 and key2; COUPLING flexes joints together; AUTO also places the "
+    "hand, BOTH two.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:

@@ -66,7 +66,7 @@ def lift(scene: Scene, arguments: Arguments) -> None:
     """Find the gentlest grip that holds an object's weight; it is reached half-way to key2 (R123, R124)."""
     first, last = read_frames(arguments, "from which on the digits close", "at which they hold the object")
     if last - first < 4.0:
-        raise arguments.error(f"LIFT wants 4 frames or more, got {last - first:g}")
+        raise arguments.error(f"LIFT needs 4 frames or more, got {last - first:g}")
     actor = gripping_actor(scene, arguments)
     prop = read_object(scene, arguments)
     if prop.name not in scene.contact.physical:

@@ -133,7 +133,7 @@ def _shots(scene: Scene, arguments: Arguments) -> tuple[Shot, ...]:
         out.append(shot)
     if not out:
         known = ", ".join(scene.shots) or "none"
-        raise arguments.error(f"SHOTS wants names of shots; there are {known}: SHOT <name> <first> <last> makes one")
+        raise arguments.error(f"SHOTS needs names of shots; there are {known}: SHOT <name> <first> <last> makes one")
     return tuple(out)
 
 

@@ -178,7 +178,7 @@ def bond(scene: Scene, arguments: Arguments) -> None:
     for _ in range(2):
         prop = read_object(scene, arguments)
         if prop.name not in scene.contact.physical:
-            raise arguments.error(f"{prop.name} is not physical: a bond wants two objects made so with PHYSICAL")
+            raise arguments.error(f"{prop.name} is not physical: a bond needs two objects made so with PHYSICAL")
         names.append(prop.name)
     if names[0] == names[1]:
         raise arguments.error(f"{names[0]} cannot be bonded to itself")

@@ -19,7 +19,7 @@ from warpjld.simulation.specification import SolveSpecification
         '[BEARS <pascals>] [STATE "<file>.npz"]'
     ),
     help=(
-        "Solve contact. A digit at its force limit (STRENGTH, BEARS) stops closing; RIGID: ignore limits; "
+        "Solve contact. A digit at its force limit (STRENGTH, BEARS) stops; RIGID: ignore limits; "
         "STOP: end there; CORRECT: open it."
     ),
     group="Contact",
