@@ -13,12 +13,13 @@ from warpjld.files.reading import reading
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct_frames import CorrectedDigit, correct_frame, uncorrected
+from warpjld.simulation.grip.correct_frames import correct_frame, uncorrected
 from warpjld.simulation.grip.find import FoundGrip, find_grip
 from warpjld.simulation.grip.kept import grip_content, restored_grip
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
+from warpjld.simulation.solve.corrected_digit import CorrectedDigit
 from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits
 from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactSolution
 from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
-from warpjld.fem.hand.muscles import JOINT_WORDS, KNUCKLES, Effort
+from warpjld.fem.hand.muscles import KNUCKLES, Effort
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
@@ -23,46 +22,16 @@ from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.sensitivity.effort_slope import EffortTangent
 from warpjld.simulation.sensitivity.parameters import angles_perturbed
 from warpjld.simulation.solve.branch import solve_branch
+from warpjld.simulation.solve.corrected_digit import CorrectedDigit
 from warpjld.skeleton import Poses
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["CorrectedDigit", "CorrectedFrame", "correct_frame", "uncorrected", "worst_digits"]
+__all__ = ["CorrectedFrame", "correct_frame", "uncorrected", "worst_digits"]
 
 _AIM = 1.0
 """Share of their limits that digits may reach."""
 _STILL = 1e-3
 """Flexion that is none [rad]."""
-
-
-@dataclass(frozen=True)
-class CorrectedDigit:
-    """One digit at one frame.
-
-    Attributes:
-        actor: Whose.
-        frame: Number.
-        digit: As ``left.index``.
-        before, after: What it bore, and bears [N].
-        limit: Largest force [N].
-        opened: By how much its joints were opened [rad].
-        status: Name of how the correction of the frame ended.
-    """
-
-    actor: str
-    frame: float
-    digit: str
-    before: float
-    after: float
-    limit: float
-    opened: tuple[float, float, float]
-    status: str
-
-    @property
-    def text(self) -> str:
-        """``index 71 N of 59 N at frame 36; opened knuckle 2 by 3.2° for 57 N``."""
-        by = [f"{word} by {math.degrees(a):.1f}°" for word, a in zip(JOINT_WORDS, self.opened, strict=True) if a > 1e-6]
-        out = f"{self.actor} {self.digit.rpartition('.')[2]} {self.before:.3g} N of {self.limit:.3g} N"
-        return f"{out} at frame {self.frame:g}; opened {', '.join(by) or 'nothing'} for {self.after:.3g} N"
 
 
 @dataclass(frozen=True, eq=False)

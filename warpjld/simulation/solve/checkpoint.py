@@ -22,9 +22,9 @@ from warpjld.files.reading import reading
 from warpjld.files.whole_file import whole_file
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.correct_frames import CorrectedDigit
 from warpjld.simulation.solve.bone_clearance import TightBone
 from warpjld.simulation.solve.checked_checkpoint import check_checkpoint, plain_record
+from warpjld.simulation.solve.corrected_digit import CorrectedDigit
 from warpjld.simulation.solve.identity import differences
 from warpjld.simulation.solve.missed_contacts import MissedContact
 from warpjld.simulation.solve.solved_frame import SolvedFrame
