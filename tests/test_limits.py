@@ -13,12 +13,12 @@ from tests.finger import finger
 from warpjld.cli import main
 from warpjld.errors import InputError
 from warpjld.fem.study.study_file import load_study
+from warpjld.files.array_file import read_arrays
 from warpjld.files.input_file import open_input
 from warpjld.files.nesting import nesting
 from warpjld.geometry.lengths import LARGEST, SMALLEST, check_size
 from warpjld.io import load_rig
 from warpjld.limits import LIMITS, check_limit, limit, set_limit, variable
-from warpjld.motion.array_file import read_arrays
 from warpjld.script import Interpreter, Scene
 from warpjld.study.grasping import load_plan
 

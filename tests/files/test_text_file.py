@@ -22,7 +22,7 @@ def test_a_byte_order_mark_is_no_text(tmp_path: Path) -> None:
     ("content", "says"),
     [
         (b"{} \xe9", r"a\.json: is not UTF-8 text \(byte 3\)"),
-        (b'{"a":\n 1,}', r"a\.json:2:4: is not JSON"),
+        (b'{"a":\n 1 1}', r"a\.json:2:4: is not JSON"),
         (b"[" * 100_000, r"a\.json: JSON: 100,000 levels; the limit is 200 \(raise it by"),
     ],
 )

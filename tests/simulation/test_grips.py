@@ -13,6 +13,7 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.fem import SolveStatus
+from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import run_contact
 from warpjld.script.runner import run_scene
@@ -132,7 +133,13 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 
 
 @pytest.mark.slow
-def test_corrections_are_kept_in_a_state_and_gone_on_from(run: Callable[[str], Scene], tmp_path: Path) -> None:
+def test_corrections_are_kept_in_a_state_and_gone_on_from(rig: Rig, tmp_path: Path) -> None:
+    def run(text: str) -> Scene:
+        scene = Scene(say=lambda text: None, warn=lambda text: None)
+        scene.add("left", rig)
+        Interpreter(scene).run_text(text)
+        return scene
+
     lines = PLATE + "STRENGTH LEFT INDEX 1\nSQUEEZE 5 8 LEFT 2.5\nPRESS 2 8 EVERY 2 CORRECT STATE 's.npz'"
     for name in ("whole", "cut"):
         (tmp_path / name).mkdir()

@@ -14,15 +14,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.binding import Anchors
+from warpjld.covering.binding import STATIONS, Anchors
+from warpjld.covering.checked_binding import check_anchors, check_array, check_runs, check_sparse
 from warpjld.covering.covering import Covering
 from warpjld.covering.fields import Fields
 from warpjld.covering.kept_key import binding_key
 from warpjld.covering.operators import fans
-from warpjld.covering.parameters import Parameters
+from warpjld.covering.parameters import Parameters, default_parameters
 from warpjld.covering.runs import Columns, Runs
 from warpjld.covering.surface_binding import bind_rig
 from warpjld.errors import InputError
+from warpjld.files.array_file import read_arrays
 from warpjld.files.kept_files import keep, kept_folder, used
 from warpjld.files.whole_file import whole_file
 from warpjld.rig import Rig
@@ -131,23 +133,42 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
     try:
         if path.is_file() and not zipfile.is_zipfile(path):
             raise ValueError("not an NPZ archive")
-        with np.load(path, allow_pickle=False) as file:
-            if str(file["format"]) != _FORMAT:
-                raise InputError("not a binding of this version", path=path)
-            if str(file["key"]) != key:
-                raise InputError("is the binding of another rig, other settings or another version", path=path)
-            arrays = {name: file[name] for name in file.files}
+        arrays = read_arrays(path)
+        if str(arrays["format"]) != _FORMAT:
+            raise InputError("not a binding of this version", path=path)
+        if str(arrays["key"]) != key:
+            raise InputError("is the binding of another rig, other settings or another version", path=path)
         anchors = Anchors(rest=rig.surface.vertices, **_part(arrays, "anchors", _ANCHORS))
         runs = Runs(Columns(*arrays["columns"].tolist()), **_part(arrays, "runs", _RUNS))
         parameters = Parameters(**_part(arrays, "parameters", _PARAMETERS))
         kept = _KeptFields({kind: _part(arrays, f"fields.{kind}", _SPARSE) for kind in _FIELDS})
         domains, swelling = arrays["domains"], arrays["swelling"]
+        chosen = rig.skeleton if skeleton is None else skeleton
+        covering = Covering(chosen, rig.surface, parameters, fans(chosen), domains, anchors)
+        _check(covering, runs, kept, swelling)
     except FileNotFoundError:
         raise InputError("no such file", path=path) from None
+    except InputError as error:
+        raise InputError(error.message, path=path) from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise InputError(f"not a binding as 'warpjld bind' writes them ({error})", path=path) from None
-    chosen = rig.skeleton if skeleton is None else skeleton
-    return Covering(chosen, rig.surface, parameters, fans(chosen), domains, anchors).keeping(runs, kept, swelling)
+    return covering.keeping(runs, kept, swelling)
+
+
+def _check(covering: Covering, runs: Runs, kept: _KeptFields, swelling: NDArray[np.float64]) -> None:
+    """Make sure that all fits the rig, and that no index lies outside its array; ValueError or InputError otherwise."""
+    skeleton, count, segments = covering.skeleton, len(covering.surface.vertices), len(covering.fans)
+    joints, stations = len(skeleton), STATIONS * len(covering.anchors.pairs)
+    for name, array in vars(default_parameters(skeleton)).items():
+        check_array(name, getattr(covering.parameters, name), array.shape, np.float64)
+    covering.parameters.check(skeleton)
+    check_anchors(covering.anchors, skeleton, segments)
+    check_runs(runs, skeleton, covering.anchors, count)
+    widths = (joints, 2 * joints, joints, joints, stations, segments)
+    for kind, width in zip(_FIELDS, widths, strict=True):
+        check_sparse(kind, kept.arrays[kind], (count, width))
+    check_array("domains", covering.domains, (count, segments), np.float64)
+    check_array("swelling", swelling, (joints,), np.float64)
 
 
 def _part(arrays: dict[str, NDArray[Any]], prefix: str, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:

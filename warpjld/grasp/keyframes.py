@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.array_file import read_arrays
 from warpjld.files.reading import reading
 from warpjld.grasp.objects import GraspObject, make_object
-from warpjld.motion.array_file import read_arrays
 
 __all__ = ["KeyframedShape", "load_keyframes"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.files.array_file import read_arrays
 from warpjld.files.reading import reading
 from warpjld.files.text_file import read_json
-from warpjld.motion.array_file import read_arrays
 from warpjld.motion.hand_motion import HandRecording
 from warpjld.motion.leap import is_leap, leap_hands
 from warpjld.motion.mano import is_mano, mano_hands

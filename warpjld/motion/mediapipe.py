@@ -46,6 +46,8 @@ _SIDES = ("handedness", "handednesses", "multi_handedness", "multiHandedness", "
 _NAMES = ("category_name", "categoryName", "label", "display_name", "displayName")
 _CONFIDENCE = ("confidence", "confidences", "score", "scores", "visibility", "presence")
 _FRAMES = ("frames", "results", "data")
+_ALL_SURE = np.ones(_COUNT)
+"""Confidence of hands without one; many hands share it."""
 
 
 def is_mediapipe(content: Any) -> bool:
@@ -209,23 +211,26 @@ def _hands_of(frame: Any, about: Mapping[str, Any]) -> list[SeenHand]:
         numbers = np.array(rows, dtype=np.float64)
         if not np.isfinite(numbers[:, :3]).all():
             continue
-        sure = numbers[:, 3] if (numbers[:, 3] > 0.0).any() else np.ones(_COUNT)  # MediaPipe's is 0 for hands
+        sure = numbers[:, 3] if (numbers[:, 3] > 0.0).any() else _ALL_SURE  # MediaPipe's is 0 for hands
         side, score = _label(stated)
         place = numbers[:, :3] * [1.0, -1.0, -1.0]
-        hands.append(SeenHand(place, sure * _sureness(sureness, slot, len(listed)), side, score, slot))
+        sure = sure if sureness is None else sure * _sureness(sureness, slot, len(listed))
+        hands.append(SeenHand(place, sure, side, score, slot))
     return hands
 
 
 def _in_image(seen: list[list[SeenHand]]) -> bool:
     """Whether coordinates are fractions of an image, mostly from 0 to 1; world coordinates are centred on 0."""
-    places = [hand.points[:, :2] * [1.0, -1.0] for hands in seen for hand in hands]
-    return bool(places) and bool(((np.array(places) >= 0.0) & (np.array(places) <= 1.0)).mean() > 0.8)
+    inside = total = 0
+    for hand in (hand for hands in seen for hand in hands):
+        places = hand.points[:, :2] * [1.0, -1.0]
+        inside += int(np.count_nonzero((places >= 0.0) & (places <= 1.0)))
+        total += places.size
+    return inside > 0.8 * total
 
 
 def _sureness(given: Any, slot: int, hands: int) -> NDArray[np.float64] | float:
     """Confidence in a hand, or in each of its landmarks, between 0 and 1."""
-    if given is None:
-        return 1.0
     array = np.asarray(given, dtype=np.float64)
     if array.shape in ((hands,), (hands, _COUNT)):
         array = array[slot]

@@ -19,8 +19,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.array_file import read_arrays
 from warpjld.files.reading import reading
-from warpjld.motion.array_file import read_arrays
 from warpjld.motion.channels import ROOT_CHANNELS
 from warpjld.motion.load import load_motion
 from warpjld.motion.tracks import Motion

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.array_file import read_arrays
 from warpjld.files.reading import reading
 from warpjld.files.text_file import read_text
-from warpjld.motion.array_file import read_arrays
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.study.scoring.reading_grasps import GraspReading, number_in
 from warpjld.tables.files import read_table
