@@ -47,7 +47,7 @@ __all__ = ["volume_keeping"]
 # proportion to it
 _PARTS = (0.33, 0.67, 1.0)
 _WIDEST = np.radians(110.0)  # largest flexion that is measured: beyond, limbs touch each other
-_MOST = 1.2  # upper bound of the amplitudes: larger ones stretch the outside by half as much again, for a percent
+_MOST = 1.0  # upper bound of the amplitudes: with 6/5 no volume is nearer to that at rest, and fingers meet sooner
 _ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of those of its rank
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _ABDUCTION = CHANNELS.index("abduction")
@@ -56,7 +56,7 @@ _ABDUCTION = CHANNELS.index("abduction")
 def volume_keeping(covering: Covering) -> NDArray[np.float64]:
     """Swelling amplitudes with which flexing joints, singly and together, preserves the flesh's volume, shape (J,).
 
-    They lie between 0 and 6/5: a joint whose flesh gains volume gets 0, and the upper bound applies where hardly any
+    They lie between 0 and 1: a joint whose flesh gains volume gets 0, and the upper bound applies where hardly any
     flesh lies on the outside of a joint.
     """
     skeleton = covering.skeleton

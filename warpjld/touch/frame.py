@@ -119,6 +119,9 @@ class Bench:
         apart, _ = model.patches.spaced(vertices, _APART)
         tested = [np.flatnonzero(mask) for mask in (first, apart & ~first, ~apart & ~first)]
         self._record(star, smooth, tested, beside)
+        filled = ("points", "joints", "_start", "_lost", "_room", "_shown", "_deepest", "_wanted", "_active")
+        self._views = {name: getattr(self, name).numpy() for name in filled}  # made once: a call takes 20 µs
+        self._found = [getattr(self.samples, n).numpy() for n in ("vertex", "own", "other", "depth", "ratio")]
 
     def _parts(self, model: Model, vertices: NDArray[np.floating], meshes: list[NDArray[np.int32]]) -> Any:
         """The kernels' struct ``touch_parts.Parts``."""
@@ -274,9 +277,9 @@ class Bench:
         found = self._overlaps(count)
         if not count:
             return found
-        there = self.points.numpy()
+        there = self._views["points"]
         before = there.copy()
-        self._start.numpy()[...] = there
+        self._views["_start"][...] = there
         for sweep in range(_SWEEPS):
             if sweep:
                 count = self._find()
@@ -287,8 +290,8 @@ class Bench:
             for command in (self._assign, *self._part):
                 command.launch()
             if sweep == 0:
-                self._lost.numpy()[...] = 0.0
-                self._room.numpy()[...] = 0.0
+                self._views["_lost"][...] = 0.0
+                self._views["_room"][...] = 0.0
                 for command in self._bulge:
                     command.launch()
         at = (there != before).any(axis=1)
@@ -297,10 +300,10 @@ class Bench:
 
     def _first(self, points: NDArray[np.floating], joints: NDArray[np.floating] | None, *, everywhere: bool) -> int:
         """Load a frame and find its samples, at all vertices or as the probes decide; returns their number."""
-        self.points.numpy()[...] = points
-        self.joints.numpy()[...] = np.nan if joints is None else joints
-        self._shown.numpy()[...] = 1.0
-        self._deepest.numpy()[...] = 0.0
+        self._views["points"][...] = points
+        self._views["joints"][...] = np.nan if joints is None else joints
+        self._views["_shown"][...] = 1.0
+        self._views["_deepest"][...] = 0.0
         for box, end in zip(self._everywhere, (-np.inf, np.inf), strict=True):
             box[...] = end
         for weight in self._pair_weights:
@@ -313,7 +316,7 @@ class Bench:
         In impossible poses most overlaps are too deep to be separated, which the probes show: with ``choose`` other
         vertices of such pairs are not tested.
         """
-        wanted, active = self._wanted.numpy(), self._active.numpy()
+        wanted, active = self._views["_wanted"], self._views["_active"]
         wanted[...] = 0
         active[...] = 0
         self._count[...] = 0
@@ -332,10 +335,7 @@ class Bench:
 
     def _overlaps(self, count: int) -> Overlaps:
         """The first ``count`` samples as arrays of their own."""
-        s = self.samples
-        vertex, own, other, depth, ratio = (
-            a.numpy()[:count].copy() for a in (s.vertex, s.own, s.other, s.depth, s.ratio)
-        )
+        vertex, own, other, depth, ratio = (values[:count].copy() for values in self._found)
         return Overlaps(vertex, own, other, depth.astype(np.float64), ratio.astype(np.float64))
 
 
