@@ -11,6 +11,9 @@ powers of what is negative left out. That, and the gap at the open end of the ed
 Inside contact, the area that friction holds ends alike: what is left of Coulomb's limit, μ p − |q|, goes to zero as √s
 (Cattaneo, Mindlin; Johnson 1985, §7.2). Slip there depends on how the loads came, so that the scale is taken from the
 next node inwards instead: of what is left at the two, the share is φ(f) / φ(f + 1).
+
+A corner, or an edge, presses on less than any face shows. Of a cone or wedge whose flanks stand off by an angle β the
+mean pressure is E* tan β / 2, however hard it is pressed (Sneddon 1948; Johnson 1985, §5.2): force over that is area.
 """
 
 from __future__ import annotations
@@ -24,6 +27,8 @@ from warpjld.fem.contact.interface.contact_interface import Interface
 __all__ = ["ContactArea", "beyond", "contact_modulus", "held_beyond"]
 
 _ROUNDS = 40
+_POINT = 1e-3
+"""Share of its surroundings below which a pressed node's area is that of a cone's or wedge's tip."""
 
 
 def contact_modulus(body: Body, interface: Interface) -> Array:
@@ -106,6 +111,7 @@ class ContactArea:
         self._interface, self._near, self._x = interface, near, x
         self._count = len(surface.nodes)
         whole = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))
+        self._area = area
         self._covered = np.zeros(self._count)
         self._covered[near] = np.minimum(area / np.maximum(whole[near], 1e-300), 1.0)
 
@@ -132,6 +138,7 @@ class ContactArea:
         f = beyond(load[i], distance[j], length, modulus[i], averaged=self._interface.averages)
         depth = faces.depth(pressed, i, j, f)
         whole = self._at_nodes(faces, depth, pressed)
+        whole = np.maximum(whole, self._tips(whole, pressure, modulus, _slopes(i, distance[j] / length, count)))
         stuck = (left > 0.0) & pressed
         if not stuck.any():
             return whole, np.zeros(len(near))
@@ -142,12 +149,26 @@ class ContactArea:
         held = np.where(pressed, np.minimum(depth, held), depth)
         return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
 
+    def _tips(self, whole: Array, pressure: Array, modulus: Array, slope: Array) -> Array:
+        """Area of what presses as a cone or a wedge, and shows none between nodes [m²], shape (n,); 0 elsewhere."""
+        near, area = self._near, self._area
+        tip = (pressure > 0.0) & (whole < _POINT * area) & (slope[near] > 0.0)
+        mean = 0.5 * modulus[near] * np.where(tip, slope[near], 1.0)
+        return np.where(tip, area * np.minimum(pressure / mean, 1.0), 0.0)
+
     def _at_nodes(self, faces: _Faces, depth: Array, pressed: Mask) -> Array:
         corners = faces.corners
         area = _positive_area(faces.at, depth[corners])
         mask = (pressed | (depth > 0.0))[corners]
         share = (area / np.maximum(mask.sum(axis=1), 1))[:, None] * mask * self._covered[corners]
         return np.asarray(np.bincount(corners.ravel(), share.ravel(), minlength=self._count)[self._near])
+
+
+def _slopes(nodes: Ints32, rise: Array, count: int) -> Array:
+    """Mean of what edges from nodes rise by, over their length, where something is opposite, shape (count,)."""
+    seen = np.isfinite(rise)
+    total = np.bincount(nodes[seen], np.maximum(rise[seen], 0.0), count)
+    return np.asarray(total / np.maximum(np.bincount(nodes[seen], minlength=count), 1))
 
 
 class _Faces:
