@@ -29,6 +29,8 @@ __all__ = ["ContactArea", "beyond", "contact_modulus", "held_beyond"]
 _ROUNDS = 40
 _POINT = 1e-3
 """Share of its surroundings below which a pressed node's area is that of a cone's or wedge's tip."""
+_STEEPEST = 0.95
+"""Most that such a flank rises, over its length."""
 
 
 def contact_modulus(body: Body, interface: Interface) -> Array:
@@ -165,9 +167,10 @@ class ContactArea:
 
 
 def _slopes(nodes: Ints32, rise: Array, count: int) -> Array:
-    """Mean of what edges from nodes rise by, over their length, where something is opposite, shape (count,)."""
+    """Mean slope of edges from nodes, by their rise over their length, where something is opposite, shape (count,)."""
     seen = np.isfinite(rise)
-    total = np.bincount(nodes[seen], np.maximum(rise[seen], 0.0), count)
+    sine = np.clip(rise[seen], 0.0, _STEEPEST)
+    total = np.bincount(nodes[seen], sine / np.sqrt(1.0 - sine**2), count)
     return np.asarray(total / np.maximum(np.bincount(nodes[seen], minlength=count), 1))
 
 

@@ -146,7 +146,7 @@ class Passing:
             pressed: Which of them press.
         """
         touched = [p.weights[np.flatnonzero(some)].indices for p, some in zip(points, pressed, strict=True)]
-        depth, k = self._deepest(u, time, touched)
+        depth, k = self.deepest(u, time, touched, np.full(len(touched), _DEEP))
         if depth == 0.0:
             return ""
         title = self._interfaces[k].pair.title
@@ -157,27 +157,35 @@ class Passing:
         share = self.share(before, u, start, time)
         count = min(int(np.ceil(_LOOKS / share)), _MOST_LOOKS) if share < 1.0 else 0
         nothing = [np.empty(0, np.int64)] * len(self._interfaces)
+        slack = np.full(len(nothing), _DEEP)
         for k in range(1, count):
             there, moment = before + k / count * (u - before), start + k / count * (time - start)
-            if self._deepest(there, moment, nothing)[0] > 0.0:
+            if self.deepest(there, moment, nothing, slack)[0] > 0.0:
                 return True
         return False
 
-    def _deepest(self, u: Array, time: float, touched: Sequence[Ints]) -> tuple[float, int]:
-        """How deep an untouched node lies in another body [m], and of which interface; 0 where none does."""
+    def deepest(self, u: Array, time: float, touched: Sequence[Ints], slack: Array) -> tuple[float, int]:
+        """How deep an untouched node lies in another body [m], and of which interface; 0 where none does.
+
+        Args:
+            u: Displacement [m], shape (3N,).
+            time: Of the obstacles.
+            touched: Nodes that something presses on, of each interface.
+            slack: Edges by which a node may lie in the other body, of each interface.
+        """
         worst, which, x = 0.0, -1, self._moved(u)
         for side in self._sides:
             if not _near(x[side.nodes], x[side.other.nodes], 0.0):
                 continue
             side.other.move(x)
             depth = -side.other.ask(x[side.nodes], 0.0)[0]
-            slack = _DEEP * np.maximum(side.edge, side.opposite_edge)
-            deepest = self._untouched(side.interface, side.nodes, depth - slack, depth, touched)
+            beyond = depth - slack[side.interface] * np.maximum(side.edge, side.opposite_edge)
+            deepest = self._untouched(side.interface, side.nodes, beyond, depth, touched)
             worst, which = max((worst, which), (deepest, side.interface))
         for k, interface, obstacle in self._obstacles:
             nodes = interface.slave.nodes
             depth = -obstacle.project(x[nodes], time).distance
-            deepest = self._untouched(k, nodes, depth - _DEEP * interface.slave.edge, depth, touched)
+            deepest = self._untouched(k, nodes, depth - slack[k] * interface.slave.edge, depth, touched)
             worst, which = max((worst, which), (deepest, k))
         return worst, which
 
