@@ -7,7 +7,7 @@ distances to the whole boundary of the other body.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.enclosure import Enclosure
 from warpjld.fem.contact.interface.mortar import Mortar
+from warpjld.fem.contact.interface.own_elements import inside_own
+from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
 from warpjld.fem.contact.obstacles.thickness import half_thickness, way_past
 from warpjld.fem.load.prescribed import components
@@ -48,6 +50,12 @@ class _Side:
     opposite_edge: float
 
 
+def _sides(k: int, mortar: Mortar, around: Callable[[ContactSurface], Enclosure]) -> list[_Side]:
+    """Both sides of interface k, with what is around the surface opposite."""
+    both = ((mortar.slave, mortar.master), (mortar.master, mortar.slave))
+    return [_Side(k, one.nodes, one.edge, around(two), two.nodes, float(np.median(two.edge))) for one, two in both]
+
+
 class Passing:
     """Watches every pair that is not bonded: bodies, a body's own parts, and obstacles.
 
@@ -61,6 +69,8 @@ class Passing:
         self._interfaces = interfaces
         self._sides: list[_Side] = []
         self._own: list[tuple[Interface, Mortar]] = []
+        self._own_sides: list[_Side] = []
+        self._elements = body.mesh.elements
         self._obstacles: list[tuple[int, Interface, Obstacle]] = []
         between = []
         for k, interface in enumerate(interfaces):
@@ -88,10 +98,10 @@ class Passing:
         for k, interface, mortar in between:
             if np.isin(piece[mortar.slave.nodes], piece[mortar.master.nodes]).any():
                 self._own.append((interface, mortar))
+                if interface.pair.exclusion is None:  # parts that may overlap are not asked about
+                    self._own_sides += _sides(k, mortar, lambda two: Enclosure(two.quads))
                 continue
-            for one, two in ((mortar.slave, mortar.master), (mortar.master, mortar.slave)):
-                far = enclosure(two.nodes)
-                self._sides.append(_Side(k, one.nodes, one.edge, far, two.nodes, float(np.median(two.edge))))
+            self._sides += _sides(k, mortar, lambda two: enclosure(two.nodes))
 
     def share(self, u: Array, ahead: Array, before: float, time: float) -> float:
         """Share of the way from displacement u at a time to another (3N,) at a later one that contact can follow."""
@@ -182,12 +192,25 @@ class Passing:
             beyond = depth - slack[side.interface] * np.maximum(side.edge, side.opposite_edge)
             deepest = self._untouched(side.interface, side.nodes, beyond, depth, touched)
             worst, which = max((worst, which), (deepest, side.interface))
+        for side in self._own_sides:
+            deepest = self._untouched(side.interface, side.nodes, *self._own_depth(side, x, slack), touched)
+            worst, which = max((worst, which), (deepest, side.interface))
         for k, interface, obstacle in self._obstacles:
             nodes = interface.slave.nodes
             depth = -obstacle.project(x[nodes], time).distance
             deepest = self._untouched(k, nodes, depth - slack[k] * interface.slave.edge, depth, touched)
             worst, which = max((worst, which), (deepest, k))
         return worst, which
+
+    def _own_depth(self, side: _Side, x: Array, slack: Array) -> tuple[Array, Array]:
+        """How far a side's nodes in elements of their own body lie beyond what may be, and behind the other surface
+        [m], shape (n,) each; 0 for those that lie in none."""
+        depth = np.zeros(len(side.nodes))
+        inside = np.flatnonzero(inside_own(x, self._elements, side.nodes))
+        if len(inside):
+            side.other.move(x)
+            depth[inside] = np.abs(side.other.ask(x[side.nodes[inside]], np.inf)[0])
+        return depth - slack[side.interface] * np.maximum(side.edge, side.opposite_edge), depth
 
     def _untouched(self, k: int, nodes: Ints32, beyond: Array, depth: Array, touched: Sequence[Ints]) -> float:
         """The greatest depth (n,) of nodes that interface k does not touch, where it is ``beyond`` (n,) what may be."""
@@ -220,7 +243,7 @@ def _past_itself(interface: Interface, mortar: Mortar, x: Array, step: Array) ->
     from scipy.spatial import cKDTree
 
     followed = _FOLLOWED * interface.reach
-    if np.linalg.norm(np.ptp(step[mortar.slave.nodes], axis=0)) <= followed:
+    if np.linalg.norm(np.ptp(step[np.union1d(mortar.slave.nodes, mortar.master.nodes)], axis=0)) <= followed:
         return 1.0
     least = 1.0
     for label in np.unique(mortar.labels[0]):
