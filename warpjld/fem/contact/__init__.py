@@ -3,7 +3,13 @@
 from warpjld.fem.contact.interface.pairs import Bond, Exclusion, Pair
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Obstacle
 from warpjld.fem.contact.press import press
-from warpjld.fem.contact.results.contact_solution import ContactError, ContactInstant, ContactSolution, PairContact
+from warpjld.fem.contact.results.contact_solution import (
+    ContactError,
+    ContactInstant,
+    ContactSolution,
+    ContactWarning,
+    PairContact,
+)
 
 __all__ = [
     "Bond",
@@ -11,6 +17,7 @@ __all__ = [
     "ContactError",
     "ContactInstant",
     "ContactSolution",
+    "ContactWarning",
     "Exclusion",
     "Obstacle",
     "Pair",

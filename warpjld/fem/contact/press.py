@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -10,8 +11,9 @@ from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.paper.loop import by_turns
-from warpjld.fem.contact.results.contact_solution import ContactError, ContactInstant, ContactSolution
+from warpjld.fem.contact.results.contact_solution import ContactError, ContactInstant, ContactSolution, ContactWarning
 from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
+from warpjld.fem.contact.solver.unresolved import unresolved
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.fem.rotation import warn_of_rotation
@@ -84,6 +86,9 @@ def press(
     else:
         steps = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
         solution = steps.run(watch, progress)
+        last = solution.last
+        for words in unresolved(body.mesh.nodes, steps.interfaces, steps.passing, last, steps.allowed(last.time)):
+            warnings.warn(words, ContactWarning, stacklevel=3)
     warn_of_rotation(body, solution.last.displacement)
     if check and not solution.converged and solution.status is not SolveStatus.STOPPED:
         raise ContactError(solution)

@@ -11,6 +11,10 @@ nodes, and linear between them.
 The border of the stick area is found alike: the reserve of friction, μ p − |q|, vanishes as √s there (Cattaneo,
 Mindlin; Johnson 1985, §7.2). As slip depends on the load history, the scale is taken from the next node inwards: the
 ratio of the two reserves is φ(f) / φ(f + 1).
+
+A corner, or an edge, is in contact over less area than its faces have. For a cone or wedge whose flanks stand off by an
+angle β the mean pressure is E* tan β / 2, independent of the force (Sneddon 1948; Johnson 1985, §5.2): force over that
+pressure is the area.
 """
 
 from __future__ import annotations
@@ -25,6 +29,10 @@ __all__ = ["ContactArea", "beyond", "contact_modulus", "held_beyond"]
 
 _ROUNDS = 40
 """Bisections for the position of a border."""
+_POINT = 1e-3
+"""Contact area of a pressed node, relative to its tributary area, below which it is taken as that of a cone's tip."""
+_STEEPEST = 0.95
+"""Largest rise of such a flank over its length."""
 
 
 def contact_modulus(body: Body, interface: Interface) -> Array:
@@ -107,6 +115,7 @@ class ContactArea:
         self._interface, self._near, self._x = interface, near, x
         self._count = len(surface.nodes)
         whole = surface.at_nodes(np.linalg.norm(surface.area_vectors(x), axis=1))
+        self._area = area
         self._covered = np.zeros(self._count)
         self._covered[near] = np.minimum(area / np.maximum(whole[near], 1e-300), 1.0)
 
@@ -135,6 +144,7 @@ class ContactArea:
         f = beyond(load[i], distance[j], length, modulus[i], averaged=self._interface.averages)
         depth = faces.depth(pressed, i, j, f)
         whole = self._at_nodes(faces, depth, pressed)
+        whole = np.maximum(whole, self._tips(whole, pressure, modulus, _slopes(i, distance[j] / length, count)))
         stuck = (left > 0.0) & pressed
         if not stuck.any():
             return whole, np.zeros(len(near))
@@ -145,6 +155,13 @@ class ContactArea:
         held = np.where(pressed, np.minimum(depth, held), depth)
         return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
 
+    def _tips(self, whole: Array, pressure: Array, modulus: Array, slope: Array) -> Array:
+        """Area of what presses as a cone or a wedge, and shows none between nodes [m²], shape (n,); 0 elsewhere."""
+        near, area = self._near, self._area
+        tip = (pressure > 0.0) & (whole < _POINT * area) & (slope[near] > 0.0)
+        mean = 0.5 * modulus[near] * np.where(tip, slope[near], 1.0)
+        return np.where(tip, area * np.minimum(pressure / mean, 1.0), 0.0)
+
     def _at_nodes(self, faces: _Faces, depth: Array, pressed: Mask) -> Array:
         """Area with positive ``depth`` (m,), divided among nodes [m²], shape (n,)."""
         corners = faces.corners
@@ -152,6 +169,14 @@ class ContactArea:
         mask = (pressed | (depth > 0.0))[corners]
         share = (area / np.maximum(mask.sum(axis=1), 1))[:, None] * mask * self._covered[corners]
         return np.asarray(np.bincount(corners.ravel(), share.ravel(), minlength=self._count)[self._near])
+
+
+def _slopes(nodes: Ints32, rise: Array, count: int) -> Array:
+    """Mean slope of edges from nodes, by their rise over their length, where something is opposite, shape (count,)."""
+    seen = np.isfinite(rise)
+    sine = np.clip(rise[seen], 0.0, _STEEPEST)
+    total = np.bincount(nodes[seen], sine / np.sqrt(1.0 - sine**2), count)
+    return np.asarray(total / np.maximum(np.bincount(nodes[seen], minlength=count), 1))
 
 
 class _Faces:

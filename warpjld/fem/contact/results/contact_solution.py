@@ -13,7 +13,7 @@ from warpjld.fem.contact.results.nodal_contact import NodalContact
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.solver.krylov import SolveStatus
 
-__all__ = ["ContactError", "ContactInstant", "ContactSolution", "LastStep", "PairContact"]
+__all__ = ["ContactError", "ContactInstant", "ContactSolution", "ContactWarning", "LastStep", "PairContact"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,3 +191,7 @@ class ContactError(WarpjldError):
     def __init__(self, solution: ContactSolution) -> None:
         self.solution = solution
         super().__init__(solution.message)
+
+
+class ContactWarning(UserWarning):
+    """Contact that the mesh is too coarse to see: its forces are too low, or follow single faces."""

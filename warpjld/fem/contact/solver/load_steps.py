@@ -134,9 +134,12 @@ class LoadSteps:
         known = self.prescribed
         now = known(time) if callable(known) else known.scaled(share)
         loads = self.loads(time) if callable(self.loads) else self.loads.scaled(share)
+        return LoadStep(before, time, now, loads, self.allowed(time))
+
+    def allowed(self, time: float) -> float:
+        """Share of the overlap at the start that is still allowed at a time."""
         overlap = any(state.allowance.any() for state in self.states)
-        allowed = max(0.0, 1.0 - (time - self.start) / (self.times[0] - self.start)) if overlap else 0.0
-        return LoadStep(before, time, now, loads, allowed)
+        return max(0.0, 1.0 - (time - self.start) / (self.times[0] - self.start)) if overlap else 0.0
 
     def run(
         self, watch: Callable[[ContactInstant], str | None] | None, progress: Callable[[str], None] | None

@@ -7,7 +7,7 @@ points, by distances to the whole boundary of the other body.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.enclosure import Enclosure
 from warpjld.fem.contact.interface.mortar import Mortar
+from warpjld.fem.contact.interface.own_elements import inside_own
+from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.contact.obstacles.obstacle import Obstacle
 from warpjld.fem.contact.obstacles.thickness import half_thickness, relative_paths
 from warpjld.fem.load.prescribed import components
@@ -57,6 +59,12 @@ class _Side:
     opposite_edge: float
 
 
+def _sides(k: int, mortar: Mortar, around: Callable[[ContactSurface], Enclosure]) -> list[_Side]:
+    """Both sides of interface k, with what is around the surface opposite."""
+    both = ((mortar.slave, mortar.master), (mortar.master, mortar.slave))
+    return [_Side(k, one.nodes, one.edge, around(two), two.nodes, float(np.median(two.edge))) for one, two in both]
+
+
 class Passing:
     """Detection for every pair that is not bonded: two bodies, a body with itself, a body with an obstacle.
 
@@ -70,6 +78,8 @@ class Passing:
         self._interfaces = interfaces
         self._sides: list[_Side] = []
         self._own: list[tuple[Interface, Mortar]] = []
+        self._own_sides: list[_Side] = []
+        self._elements = body.mesh.elements
         self._obstacles: list[tuple[int, Interface, Obstacle]] = []
         between = []
         for k, interface in enumerate(interfaces):
@@ -97,10 +107,10 @@ class Passing:
         for k, interface, mortar in between:
             if np.isin(piece[mortar.slave.nodes], piece[mortar.master.nodes]).any():
                 self._own.append((interface, mortar))
+                if interface.pair.exclusion is None:  # parts that may overlap are not asked about
+                    self._own_sides += _sides(k, mortar, lambda two: Enclosure(two.quads))
                 continue
-            for one, two in ((mortar.slave, mortar.master), (mortar.master, mortar.slave)):
-                far = enclosure(two.nodes)
-                self._sides.append(_Side(k, one.nodes, one.edge, far, two.nodes, float(np.median(two.edge))))
+            self._sides += _sides(k, mortar, lambda two: enclosure(two.nodes))
 
     def share(self, u: Array, ahead: Array, before: float, time: float) -> float:
         """Fraction of the motion from displacement u to ``ahead`` (3N,) between two times that contact can follow."""
@@ -154,7 +164,7 @@ class Passing:
             pressed: Mask of the active ones.
         """
         touched = [p.weights[np.flatnonzero(mask)].indices for p, mask in zip(points, pressed, strict=True)]
-        depth, k = self._deepest(u, time, touched)
+        depth, k = self.deepest(u, time, touched, np.full(len(touched), _DEEP))
         if depth == 0.0:
             return ""
         title = self._interfaces[k].pair.title
@@ -164,30 +174,51 @@ class Passing:
         """Whether bodies lie deep in each other on the straight path between displacements (3N,) at two times."""
         share = self.share(before, u, start, time)
         count = min(int(np.ceil(_LOOKS / share)), _MOST_LOOKS) if share < 1.0 else 0
-        none = [np.empty(0, np.int64)] * len(self._interfaces)
+        nothing = [np.empty(0, np.int64)] * len(self._interfaces)
+        slack = np.full(len(nothing), _DEEP)
         for k in range(1, count):
             there, moment = before + k / count * (u - before), start + k / count * (time - start)
-            if self._deepest(there, moment, none)[0] > 0.0:
+            if self.deepest(there, moment, nothing, slack)[0] > 0.0:
                 return True
         return False
 
-    def _deepest(self, u: Array, time: float, touched: Sequence[Ints]) -> tuple[float, int]:
-        """Largest depth of an inactive node in another body [m], and the index of its interface; 0 if there is none."""
+    def deepest(self, u: Array, time: float, touched: Sequence[Ints], slack: Array) -> tuple[float, int]:
+        """Largest depth of an inactive node in another body [m], and the index of its interface; 0 if there is none.
+
+        Args:
+            u: Displacement [m], shape (3N,).
+            time: Time of the obstacles.
+            touched: Nodes in contact, of each interface.
+            slack: Number of edge lengths by which a node may lie in the other body, of each interface.
+        """
         worst, which, x = 0.0, -1, self._moved(u)
         for side in self._sides:
             if not _near(x[side.nodes], x[side.other.nodes], 0.0):
                 continue
             side.other.move(x)
             depth = -side.other.ask(x[side.nodes], 0.0)[0]
-            slack = _DEEP * np.maximum(side.edge, side.opposite_edge)
-            deepest = self._untouched(side.interface, side.nodes, depth - slack, depth, touched)
+            beyond = depth - slack[side.interface] * np.maximum(side.edge, side.opposite_edge)
+            deepest = self._untouched(side.interface, side.nodes, beyond, depth, touched)
+            worst, which = max((worst, which), (deepest, side.interface))
+        for side in self._own_sides:
+            deepest = self._untouched(side.interface, side.nodes, *self._own_depth(side, x, slack), touched)
             worst, which = max((worst, which), (deepest, side.interface))
         for k, interface, obstacle in self._obstacles:
             nodes = interface.slave.nodes
             depth = -obstacle.project(x[nodes], time).distance
-            deepest = self._untouched(k, nodes, depth - _DEEP * interface.slave.edge, depth, touched)
+            deepest = self._untouched(k, nodes, depth - slack[k] * interface.slave.edge, depth, touched)
             worst, which = max((worst, which), (deepest, k))
         return worst, which
+
+    def _own_depth(self, side: _Side, x: Array, slack: Array) -> tuple[Array, Array]:
+        """How far a side's nodes in elements of their own body lie beyond what may be, and behind the other surface
+        [m], shape (n,) each; 0 for those that lie in none."""
+        depth = np.zeros(len(side.nodes))
+        inside = np.flatnonzero(inside_own(x, self._elements, side.nodes))
+        if len(inside):
+            side.other.move(x)
+            depth[inside] = np.abs(side.other.ask(x[side.nodes[inside]], np.inf)[0])
+        return depth - slack[side.interface] * np.maximum(side.edge, side.opposite_edge), depth
 
     def _untouched(self, k: int, nodes: Ints32, beyond: Array, depth: Array, touched: Sequence[Ints]) -> float:
         """Largest ``depth`` (n,) of inactive nodes of interface k among those whose excess over the admissible depth,
@@ -221,7 +252,7 @@ def _past_itself(interface: Interface, mortar: Mortar, x: Array, step: Array) ->
     from scipy.spatial import cKDTree
 
     followed = _FOLLOWED * interface.reach
-    if np.linalg.norm(np.ptp(step[mortar.slave.nodes], axis=0)) <= followed:
+    if np.linalg.norm(np.ptp(step[np.union1d(mortar.slave.nodes, mortar.master.nodes)], axis=0)) <= followed:
         return 1.0
     least = 1.0
     for label in np.unique(mortar.labels[0]):

@@ -1,0 +1,57 @@
+"""Nodes of a body that lie in elements of its own: parts of one body that stand in one another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
+
+__all__ = ["inside_own"]
+
+_CORNERS = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
+)
+_ROUNDS = 8
+_WITHIN = 1.0 - 1e-6
+
+
+def inside_own(x: Array, elements: Ints32, nodes: Ints) -> Mask:
+    """Which nodes lie in an element that they are no corner of, shape (n,).
+
+    Args:
+        x: Positions of all nodes [m], shape (N, 3).
+        elements: Corners of hexahedra, shape (E, 8).
+        nodes: Those asked for, shape (n,).
+    """
+    from scipy.spatial import cKDTree
+
+    corners = x[elements]
+    centres = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
+    near = cKDTree(centres).query_ball_point(x[nodes], float(radius.max()))
+    counts = np.array([len(some) for some in near])
+    which = np.repeat(np.arange(len(nodes)), counts)
+    element = np.concatenate([np.asarray(some, dtype=np.int64) for some in near]) if len(which) else which
+    at = x[nodes[which]]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    kept = ((at > low[element]) & (at < high[element])).all(axis=1)
+    kept &= (elements[element] != nodes[which, None]).all(axis=1)
+    which, element, at = which[kept], element[kept], at[kept]
+    place = _natural(corners[element], at)
+    out = np.zeros(len(nodes), dtype=bool)
+    out[which[np.abs(place).max(axis=1, initial=0.0) < _WITHIN]] = True
+    return out
+
+
+def _natural(corners: Array, at: Array) -> Array:
+    """Natural coordinates of points (n, 3) in hexahedra with corners (n, 8, 3), by Newton's method, shape (n, 3)."""
+    place = np.zeros_like(at)
+    for _ in range(_ROUNDS):
+        factors = 1.0 + place[:, None] * _CORNERS
+        shape = factors.prod(axis=2) / 8.0
+        slope = np.stack([_CORNERS[:, k] * np.delete(factors, k, axis=2).prod(axis=2) / 8.0 for k in range(3)], axis=2)
+        jacobian = np.einsum("nai,nak->nik", corners, slope)
+        left = at - np.einsum("na,nai->ni", shape, corners)
+        step = np.linalg.solve(jacobian, left[:, :, None])[:, :, 0]
+        place = np.clip(place + step, -3.0, 3.0)
+    return place
