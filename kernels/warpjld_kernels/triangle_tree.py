@@ -55,6 +55,18 @@ class Tree:
             const float* leaf = tree.corners.data + {9 * WIDTH} * size_t(-1 - node);
             const int* number = tree.face.data + {WIDTH} * size_t(-1 - node);
             for (int base = 0; base < {WIDTH}; base += N) {{
+                // most triangles of a leaf lie in boxes that are too far: in float32, as the leaf itself was
+                Floats outside = Floats(0.0f);
+                for (int i = 0; i < 3; ++i) {{
+                    const Floats a = *(const Stored*)(leaf + {WIDTH} * i + base);
+                    const Floats b = *(const Stored*)(leaf + {WIDTH} * (3 + i) + base);
+                    const Floats c = *(const Stored*)(leaf + {WIDTH} * (6 + i) + base);
+                    const Floats below = LOWEST(LOWEST(a, b), c) - at[i];
+                    const Floats over = at[i] - HIGHEST(HIGHEST(a, b), c);
+                    const Floats gap = HIGHEST(HIGHEST(below, over), Floats(0.0f));
+                    outside += gap * gap;
+                }}
+                if (!LANES_OF(outside * 0.999998f <= (float)best)) continue;
                 Doubles corner[3][3], edge[3][3], normal[3], squared;
                 Doubles lateral = Doubles(1e300), lengths = Doubles(0.0);
                 for (int k = 0; k < 3; ++k)

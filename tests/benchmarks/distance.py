@@ -1,9 +1,10 @@
-"""How fast distances and searches are, beside Open3D, in one run.
+"""How fast distances and searches are, beside Open3D and queries of ``wp.Mesh``, in one run.
 
     python tests/benchmarks/distance.py [--points 10000] [--repeats 15]
 
-Open3D (pip install open3d) is left out where it is not installed. Rows are measured in turn, so that a machine that
-slows down slows all of them; compare ratios. Half of the points lie within 5 mm of the surface.
+Open3D (pip install open3d) is left out where it is not installed. Queries of ``wp.Mesh`` run on one thread, and give
+float32 distances whose sign is by winding number, or by the nearest feature's normal. Rows are measured in turn, so
+that a machine that slows down slows all of them; compare ratios. Half of the points lie within 5 mm of the surface.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Callable
 
 import click
 import numpy as np
+import warp as wp
 from rich.console import Console
 from rich.table import Table
 
@@ -73,6 +75,7 @@ def distances(thing: GraspObject, count: int, repeats: int) -> Table:
         )
         if scene := open3d_scene(thing):
             methods[f"Open3D, all distances, {threads}"] = lambda t=threads: scene.signed(points, t)
+    methods |= {f"{name}, 1": (lambda q=query: q.signed(points)) for name, query in mesh_queries(thing).items()}
     times = in_turn(methods, repeats)
     title = f"signed distance to {len(thing.faces):,} triangles, thousand points per second (median)"
     return beside_open3d(title, times, count / 1e3)
@@ -106,6 +109,12 @@ def deforming_hand(thing: GraspObject, repeats: int) -> Table:
         methods[f"warpjld, those within 5 mm, {threads}"] = lambda t=threads: mine(t, 0.005)
         if scene := open3d_scene(thing):
             methods[f"Open3D, all distances, {threads}"] = lambda t=threads, s=scene: theirs(s, t)
+
+    def queried(query: MeshQuery) -> None:
+        surfaces = covering.deform(poses, out=skin, threads=1)
+        query.signed((surfaces - placed.place.position[0].astype(np.float32)).reshape(-1, 3))
+
+    methods |= {f"{name}, 1": (lambda q=query: queried(q)) for name, query in mesh_queries(thing).items()}
     times = in_turn(methods, max(3, repeats // 3))
     count = len(rig.surface.vertices)
     title = (
@@ -123,6 +132,8 @@ def beside_open3d(title: str, times: dict[str, list[float]], done: float) -> Tab
     for name in (*ours, peer):
         if f"{name}, 1" in times:
             table.add_row(name, *(f"{done / np.median(times[f'{name}, {t}']):.0f}" for t in (1, 2)))
+    for name in QUERIES:
+        table.add_row(name, f"{done / np.median(times[f'{name}, 1']):.0f}", "")
     for name in ours:
         if f"{peer}, 1" in times:
             ratios = [np.median(np.divide(times[f"{peer}, {t}"], times[f"{name}, {t}"])) for t in (1, 2)]
@@ -208,6 +219,46 @@ def open_hands(skeleton, count: int) -> tuple[Poses, np.ndarray]:
     ):
         angles[:, skeleton.index(name), CHANNELS.index(channel)] = np.radians(degrees)
     return poses_from_angles(skeleton, angles), angles
+
+
+QUERIES = ("wp.Mesh, sign by winding number", "wp.Mesh, sign by normal")
+
+
+@wp.kernel(enable_backward=False)
+def query_mesh(
+    mesh: wp.uint64, points: wp.array(dtype=wp.vec3), by_normal: wp.bool, distance_out: wp.array(dtype=float)
+):
+    """Signed distance by Warp's own queries."""
+    i = wp.tid()
+    point = points[i]
+    if by_normal:
+        found = wp.mesh_query_point_sign_normal(mesh, point, 1.0e6)
+    else:
+        found = wp.mesh_query_point_sign_winding_number(mesh, point, 1.0e6, 2.0, 0.5)
+    near = wp.mesh_eval_position(mesh, found.face, found.u, found.v)
+    distance_out[i] = found.sign * wp.length(near - point)
+
+
+class MeshQuery:
+    """A ``wp.Mesh`` of one object, on the CPU."""
+
+    def __init__(self, thing: GraspObject, *, by_normal: bool) -> None:
+        self._by_normal = by_normal
+        vertices = wp.array(thing.vertices.astype(np.float32), dtype=wp.vec3, device="cpu")
+        faces = wp.array(thing.faces.astype(np.int32).ravel(), dtype=wp.int32, device="cpu")
+        self._mesh = wp.Mesh(vertices, faces, support_winding_number=not by_normal)
+
+    def signed(self, points: np.ndarray) -> np.ndarray:
+        """Signed distances [m] of points (n, 3)."""
+        at = wp.array(np.ascontiguousarray(points), dtype=wp.vec3, device="cpu", copy=False)
+        out = wp.zeros(len(points), dtype=float, device="cpu")
+        wp.launch(query_mesh, len(points), inputs=[self._mesh.id, at, self._by_normal, out], device="cpu")
+        return out.numpy()
+
+
+def mesh_queries(thing: GraspObject) -> dict[str, MeshQuery]:
+    """Both ways of telling inside from outside."""
+    return {name: MeshQuery(thing, by_normal=name.endswith("normal")) for name in QUERIES}
 
 
 class Open3DScene:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpjld.files.whole_file import whole_file
 from warpjld.skeleton import DIGITS
+from warpjld.study.grasping.choices import HandChoice
 from warpjld.study.grasping.load import hand_of
 from warpjld.study.grasping.plan import GraspPlan
 
@@ -22,8 +23,8 @@ GRIP_SHARES = {"index": 37.0, "middle": 37.5, "ring": 27.0, "pinky": 13.4}
 _FINGERS = tuple(GRIP_SHARES)
 _INKS = ("#4d7ea8", "#c8553d", "#6a994e", "#bc8034", "#7b5ea7", "#23272e")
 _COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
-_VIEW = (260, 300)
-"""Pixels of one map."""
+_VIEW = (400, 300)
+"""Width and height of one map in pixels; the scale of colours stands beside the hand."""
 
 Row = Mapping[str, Any]
 
@@ -91,7 +92,9 @@ def _by_hand(axis: Any, plan: GraspPlan, rows: Sequence[Row], value: Any, label:
     objects = [one.name for one in plan.objects]
     for k, hand in enumerate(one.name for one in plan.hands):
         mine = [(objects.index(row["object"]), value(row)) for row in rows if row["hand"] == hand]
-        axis.plot(*zip(*mine, strict=True), "o", color=_INKS[k % len(_INKS)], label=hand) if mine else None
+        shift = 0.08 * (k - 0.5 * (len(plan.hands) - 1))
+        places = [at + shift for at, _ in mine]
+        axis.plot(places, [one for _, one in mine], "o", color=_INKS[k % len(_INKS)], label=hand)
     axis.set_xticks(np.arange(len(objects)), objects)
     axis.set(ylabel=label, ylim=(0.0, None))
     axis.legend(fontsize=8)
@@ -124,8 +127,7 @@ def _maps(path: Path, plan: GraspPlan, rows: Sequence[Row], arrays: Mapping[str,
     things = [thing.name for thing in plan.objects if any(name == thing.name for _, name in found)]
     pictures = []
     for hand in hands:
-        nothing = np.zeros(len(hand_of(hand).rig.surface.vertices))
-        pictures += [_palm(hand, found.get((hand.name, thing), nothing), scale) for thing in things]
+        pictures += [_palm(hand, found.get((hand.name, thing)), scale) for thing in things]
     table = [pictures[k : k + len(things)] for k in range(0, len(pictures), len(things))]
     title = f"{plan.title}: {', '.join(hand.name for hand in hands)} from top to bottom"
     return save_picture(path, grid(table, captions=things, title=title))
@@ -141,7 +143,10 @@ def _highest(
     return np.asarray(arrays[name][own].max(axis=0)) if own else None
 
 
-def _palm(choice: Any, pressure: NDArray[np.float64], scale: Any) -> NDArray[np.uint8]:
+def _palm(choice: HandChoice, pressure: NDArray[np.float64] | None, scale: Any) -> NDArray[np.uint8]:
+    """A palm in colours; nothing where nothing is known."""
+    if pressure is None:
+        return np.full((_VIEW[1], _VIEW[0], 3), 255, dtype=np.uint8)
     from warpjld.render import Camera, SceneRenderer
 
     hand = hand_of(choice)
