@@ -129,6 +129,7 @@ def main() -> None:
             path.write_text(text)
             room = Room(opened_document(path, Path(folder) / "out"), port=0)
             page = browser.new_page(viewport=SIZE)
+            page.set_default_timeout(300_000)  # a busy machine without a graphics card takes its time
             page.goto(room.address)
             page.get_by_text("Joints", exact=True).wait_for()
             page.get_by_text("Software WebGL").first.wait_for()
