@@ -1,6 +1,8 @@
 """Pictures of the studio for the documentation, taken in Chromium.
 
-python docs/make_studio_pictures.py [NAME …]        # into docs/pictures/, about two minutes
+python docs/make_studio_pictures.py [NAME …] [--into FOLDER]     # into docs/pictures/, minutes
+
+Without names those of the documentation; the others are of single panels, to be looked at.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ SIZE = {"width": 1180, "height": 820}
 FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 CURL = "HAND LEFT BUILTIN\nPOSE LEFT RELAXED 0\nPOSE LEFT FIST 20\n"
+BALL = "HAND LEFT BUILTIN RESOLUTION 1500\nOBJECT BALL1 BALL 0.065 AT 0 0.1 0\n"
 PLATE = """HAND LEFT BUILTIN
 FRAMES 0 20
 OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
@@ -38,6 +41,42 @@ PRESS 0 20 EVERY 4
 def curl(page: Any, room: Room) -> None:
     """A hand half closed."""
     room.post(lambda: setattr(room.state, "frame", 11.0))
+
+
+def pose(page: Any, room: Room) -> None:
+    """A joint selected, ghosts of the keys around."""
+    room.post(lambda: setattr(room.state, "frame", 11.0))
+    page.get_by_label("Ghosts of neighbouring keys", exact=True).check()
+    room.post(lambda: room.selected.select("left.index.knuckle2"))
+
+
+def library(page: Any, room: Room) -> None:
+    """Pictures of the poses."""
+    page.get_by_text("Poses", exact=True).click()
+    page.get_by_role("button", name="Pictures of the poses").click()
+    page.wait_for_function("document.querySelectorAll('img').length > 0", timeout=120_000)
+
+
+def grasps(page: Any, room: Room) -> None:
+    """Ways to take a ball."""
+    room.post(lambda: setattr(room.things.which, "value", "BALL1"))
+    page.get_by_text("Objects", exact=True).last.click()
+    page.get_by_role("button", name="auto", exact=True).click()
+    page.get_by_role("button", name="Take it this way").wait_for(timeout=600_000)
+    page.get_by_role("button", name="Cancel").wait_for(state="hidden", timeout=600_000)
+
+
+def script(page: Any, room: Room) -> None:
+    """The script, with a fault."""
+    page.get_by_role("tab", name="Script", exact=True).click()
+    room.post(lambda: room.state.write(CURL + "JOINT left.index.base FLEXION AT 0 400\n"))
+    page.locator("#studio-error").wait_for()
+
+
+def keys(page: Any, room: Room) -> None:
+    """The curve of a channel."""
+    page.get_by_role("tab", name="Keys", exact=True).click()
+    room.post(lambda: setattr(room.panels[-3].channel, "value", "left.index.base.flexion"))
 
 
 def menu(page: Any, room: Room) -> None:
@@ -68,16 +107,29 @@ def main() -> None:
     shots: dict[str, tuple[str, Callable[[Any, Room], None]]] = {
         "studio": (CURL, curl),
         "studio_menu": (CURL, menu),
+        "pose": (CURL, pose),
+        "library": (CURL, library),
+        "grasps": (BALL, grasps),
+        "script": (CURL, script),
+        "keys": (CURL, keys),
         "studio_press": (PLATE, press),
     }
+    names = sys.argv[1:]
+    into = PICTURES
+    if "--into" in names:
+        at = names.index("--into")
+        into = Path(names[at + 1])
+        del names[at : at + 2]
+    documented = [name for name in shots if name.startswith("studio")]
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
-        for name in sys.argv[1:] or shots:
+        for name in names or documented:
             text, prepare = shots[name]
-            script = Path(folder) / "hand.jld"
-            script.write_text(text)
-            room = Room(opened_document(script, Path(folder) / "out"), port=0)
+            path = Path(folder) / "hand.jld"
+            path.write_text(text)
+            room = Room(opened_document(path, Path(folder) / "out"), port=0)
             page = browser.new_page(viewport=SIZE)
+            page.set_default_timeout(300_000)  # a busy machine without a graphics card takes its time
             page.goto(room.address)
             page.get_by_text("Joints", exact=True).wait_for()
             page.get_by_text("Software WebGL").first.wait_for()
@@ -86,7 +138,7 @@ def main() -> None:
             room.worker.settle()
             page.wait_for_timeout(4000)  # software WebGL draws when it can
             shot = Image.open(BytesIO(page.screenshot())).convert("RGB")
-            shot.save(PICTURES / f"{name}.jpg", quality=80, optimize=True)
+            shot.save(into / f"{name}.jpg", quality=80, optimize=True)
             page.close()
             room.stop()
         browser.close()

@@ -95,11 +95,13 @@ class Window:
         # the hint that WebGL is computed in software comes and goes over the canvas
         self.page.add_style_tag(content=".mantine-Notifications-root, .mantine-Notification-root {display: none}")
         self.page.get_by_text("Joints", exact=True).wait_for()
+        self._width = int(self.page.get_by_role("tab", name="Pose", exact=True).bounding_box()["x"]) - 30
         until(lambda: self.skin() > 1000, "the hand is drawn")
 
     def pixels(self) -> np.ndarray:
-        """The canvas, shape (H, W, 3)."""
-        shot = self.page.locator("canvas").first.screenshot()
+        """The stage, left of the panels, shape (H, W, 3)."""
+        height = self.page.viewport_size["height"]
+        shot = self.page.screenshot(clip={"x": 0, "y": 0, "width": self._width, "height": height})
         return np.asarray(Image.open(BytesIO(shot)).convert("RGB"), np.int16)
 
     def still(self) -> np.ndarray:

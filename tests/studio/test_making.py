@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -104,3 +106,36 @@ def test_work_is_cancelled_where_it_tells_of_its_progress_and_its_errors_are_han
     assert result is None
     assert isinstance(error, ValueError)
     assert work.running is None
+
+
+def test_work_that_tells_nothing_is_interrupted_but_never_while_it_imports(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "slow_module.py").write_text("import time\nfor k in range(150):\n    time.sleep(0.01)\nwhole = True\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("warpjld.studio.background._PATIENCE", 0.1)
+    ended, begun = threading.Event(), threading.Event()
+    found: list[tuple[object, BaseException | None]] = []
+
+    def end(result: object, error: BaseException | None) -> None:
+        found.append((result, error))
+        ended.set()
+
+    def endless(progress) -> None:
+        begun.set()
+        import slow_module  # type: ignore[import-not-found]
+
+        assert slow_module.whole
+        while True:
+            time.sleep(0.01)
+
+    work = Background(lambda: None)
+    assert work.start("endless", endless, end)
+    assert begun.wait(10)
+    work.cancel()
+    assert ended.wait(20)
+    assert found == [(None, None)]
+    assert sys.modules.pop("slow_module").whole
+    assert work.running is None
+    assert work.start("another", lambda progress: 7, end)  # what comes next is not interrupted
+    while len(found) < 2:
+        assert ended.wait(10)
+    assert found[1] == (7, None)

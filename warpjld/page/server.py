@@ -103,5 +103,5 @@ def _light(server: Any) -> None:
     scene = server.scene
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
-    scene.add_light_hemisphere("/light/sky", sky_color=(255, 250, 244), ground_color=(148, 132, 140), intensity=2.0)
+    scene.add_light_hemisphere("/light/sky", sky_color=(255, 250, 244), ground_color=(148, 132, 140), intensity=1.5)
     scene.add_light_directional("/light/lamp", intensity=2.4, position=(1.0, 2.0, 1.0))

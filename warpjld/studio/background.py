@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import sys
 import threading
+import time
 from collections.abc import Callable
 
 __all__ = ["Background", "JobProgress"]
@@ -12,6 +14,9 @@ JobProgress = Callable[[str, int, int], None]
 
 _PATIENCE = 1.0
 """How long cancelled work may go on without telling of its progress before it is interrupted where it is [s]."""
+_LOOK = 0.02  # how often it is looked whether it may be interrupted [s]
+_WHOLE = ("<frozen importlib", "/warp/", "\\warp\\")
+"""Files of code that is not interrupted: modules being imported, or kernels being built, would be left half done."""
 
 
 class _CancelledError(BaseException):
@@ -82,16 +87,31 @@ class Background:
         self._changed()
 
     def _interrupt(self, thread: threading.Thread | None) -> None:
-        """Raise in the thread if it still does the work."""
-        with self._guard:
-            if thread is self._thread and thread is not None and self._inside and self._cancel.is_set():
-                _raise_in(thread, _CancelledError)
+        """Raise in the thread as soon as it is where that does no harm, if it still does the work."""
+        while thread is not None:
+            with self._guard:
+                if thread is not self._thread or not self._inside or not self._cancel.is_set():
+                    return
+                if not _is_whole(thread):
+                    _raise_in(thread, _CancelledError)
+                    return
+            time.sleep(_LOOK)
 
     def _leave(self) -> None:
         """Nothing is raised in this thread from now on."""
         with self._guard:
             self._inside = False
             _raise_in(threading.current_thread(), None)
+
+
+def _is_whole(thread: threading.Thread) -> bool:
+    """Whether a thread runs code that has to come to its end."""
+    frame = sys._current_frames().get(thread.ident or 0)
+    while frame is not None:
+        if any(part in frame.f_code.co_filename for part in _WHOLE):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _raise_in(thread: threading.Thread, error: type[BaseException] | None) -> None:

@@ -97,7 +97,7 @@ class Room:
         with tabs.add_tab("Pose"):
             self.stage, ghosts, pose = StagePanel(self), GhostsPanel(self), PoseToolsPanel(self)
             self.drag, self.things, self.skin = DragPanel(self), ThingsPanel(self), SkinPanel(self)
-            selected, sliders = SelectedPanel(self), SlidersPanel(self)
+            self.selected, sliders = SelectedPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
             script = ScriptPanel(self)
         with tabs.add_tab("Work"):
@@ -110,7 +110,7 @@ class Room:
         with below.add_tab("Keys"):
             curves = CurvesPanel(self)
         below.dock_below(gui.main_panel)
-        posing = [self.stage, ghosts, pose, self.drag, self.things, self.skin, selected, sliders]
+        posing = [self.stage, ghosts, pose, self.drag, self.things, self.skin, self.selected, sliders]
         self.panels = [*posing, script, files, work, menus, timeline, curves, self.progress, messages]
 
     def _beside(self, text: str, then: Callable[[], object]) -> None:

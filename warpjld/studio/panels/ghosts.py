@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.normals import vertex_normals
 from warpjld.page.server import add_surface
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ __all__ = ["GhostsPanel"]
 
 _COLORS = {"before": "#4c78a8", "after": "#e07b39"}
 _OPACITY = 0.18
+_INSIDE = 4e-4  # m
 
 
 class GhostsPanel:
@@ -35,15 +37,17 @@ class GhostsPanel:
         for which, key in state.neighbours().items() if self.on.value else ():
             for one in state.surfaces.at(state.scene, key):
                 if one.name in state.scene.actors:
-                    wanted[f"/ghosts/{which}/{one.name}"] = which, one
+                    # a little inside, so that skin that has not moved hides its ghost
+                    inside = one.vertices - np.float32(_INSIDE) * vertex_normals(one.vertices, one.faces)
+                    wanted[f"/ghosts/{which}/{one.name}"] = which, inside, one.faces
         for name in [*self._meshes]:
-            if name not in wanted or len(self._drawn[name]) != len(wanted[name][1].vertices):
+            if name not in wanted or len(self._drawn[name]) != len(wanted[name][1]):
                 self._meshes.pop(name).remove()
-        for name, (which, one) in wanted.items():
+        for name, (which, vertices, faces) in wanted.items():
             if name not in self._meshes:
                 self._meshes[name] = add_surface(
-                    self._room.server, name, one.vertices, one.faces, _COLORS[which], opacity=_OPACITY
+                    self._room.server, name, vertices, faces, _COLORS[which], opacity=_OPACITY
                 )
-            elif not np.array_equal(self._drawn[name], one.vertices):
-                self._meshes[name].vertices = one.vertices
-            self._drawn[name] = one.vertices
+            elif not np.array_equal(self._drawn[name], vertices):
+                self._meshes[name].vertices = vertices
+            self._drawn[name] = vertices
