@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.bone_surfaces import BoneSurface, SurfaceBone
 from warpjld.fem.flesh import Flesh
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.cushion import Cushion, cushions
@@ -67,11 +69,18 @@ class _Posed:
     gap: float
 
 
-_CLASSES = (_Meshed, Flesh, HexMesh, Bone, Embedding, Fit, Moves, Cushion)
+_CLASSES = (_Meshed, Flesh, HexMesh, Bone, SurfaceBone, BoneSurface, Embedding, Fit, Moves, Cushion)
 _SHARED = ("place", "weights", "skin_faces", "skin_labels", "label_names", "excluded", "skin_fringes")
 
 
-def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArray[np.float64]) -> RestingFlesh:
+def resting_flesh(
+    rig: Rig,
+    element: float,
+    name: str,
+    poses: Poses,
+    skin: NDArray[np.float64],
+    bones: Sequence[BoneSurface] = (),
+) -> RestingFlesh:
     """A rig's flesh, meshed at its rest and carried to a pose; out of files where that was done before.
 
     Args:
@@ -80,17 +89,19 @@ def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArr
         name: As of ``build_flesh_hand``.
         poses: One pose.
         skin: Its surface there [m], shape (V, 3).
+        bones: Surfaces of its bones, where there are any.
 
     Raises:
         InputError: It cannot be meshed, or not in that pose.
     """
 
     def mesh() -> _Meshed:
-        hand = build_flesh_hand(rig, element, name=name)
+        hand = build_flesh_hand(rig, element, name=name, bones=bones)
         parts = {part: getattr(hand, part) for part in _SHARED}
         return _Meshed(flesh=hand.flesh, cushions=cushions(hand), **parts)
 
-    key = hash_of(rig.surface.vertices, rig.surface.faces, rig.skeleton, element, name)
+    shapes = tuple((one.name, one.vertices, one.faces) for one in bones)
+    key = hash_of(rig.surface.vertices, rig.surface.faces, rig.skeleton, element, name, shapes)
     meshed, notes = kept_value("flesh", key, _CLASSES, mesh, modules=MESHING)
     parts = {part: getattr(meshed, part) for part in _SHARED}
     built = FleshHand(name=name, flesh=meshed.flesh, skeleton=rig.skeleton, surface=rig.surface, **parts)
