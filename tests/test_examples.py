@@ -125,7 +125,7 @@ def test_a_bar_in_pieces_parts(tmp_path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["flesh_pads.jld", "flesh_palms.jld", "flesh_handshake.jld"])
+@pytest.mark.parametrize("name", ["flesh_pads.jld", "flesh_palms.jld", "flesh_handshake.jld", "flesh_forearm.jld"])
 def test_flesh_of_two_actors(name: str, tmp_path) -> None:
     """Both hands press, each on the other, with forces that sum to nothing (R126)."""
     summary = run_small(name, tmp_path)

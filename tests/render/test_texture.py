@@ -125,7 +125,7 @@ def test_what_is_not_there_or_no_picture(tmp_path: Path) -> None:
     next(tmp_path.glob("*.png")).write_bytes(b"no picture")
     scene = Scene(say=lambda text: None)
     Interpreter(scene).run_text(f'OBJECT cube "{path}"')
-    with pytest.raises(InputError, match="texture that cannot be read"):
+    with pytest.raises(InputError, match=r"CUBE: a texture that cannot be read.*COLOR gives"):
         texture_of(scene.props["CUBE"])
     next(tmp_path.glob("*.png")).unlink()
     assert load_object(path).paint is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.bone_surfaces import BoneSurface, SurfaceBone, bones_of_segments
 from warpjld.fem.load.prescribed import Prescribed, prescribe
 from warpjld.fem.mesh.bones import Bone, claimed, fitted
 from warpjld.fem.mesh.embedding import Embedding, embed
@@ -69,6 +71,7 @@ def flesh_of(
     gap: float = 0.08,
     head: float | None = None,
     least: float = 0.1,
+    bones: Sequence[BoneSurface] = (),
 ) -> Flesh:
     """Mesh the inside of a rig's surface and mark its bones.
 
@@ -84,6 +87,7 @@ def flesh_of(
         head: Likewise at the distal end where another segment follows, ``gap`` by default; small, so that the head of
             the bone forms the knuckle.
         least: Smallest scaled Jacobian.
+        bones: Surfaces of bones, in place of round ones along their segments.
 
     Raises:
         InputError: Shares that give no bone, a surface that cannot be meshed, or no bone at this spacing.
@@ -96,11 +100,13 @@ def flesh_of(
     mesh = fit.mesh
     skeleton = rig.skeleton
     shafts = _shafts(rig, envelope, bone, flush, gap, far)
+    own = bones_of_segments(rig, bones)
+    shafts |= {joint: SurfaceBone(**vars(shafts[joint]), surface=shape) for joint, shape in own.items()}
     owner = _owner(mesh, shafts, skeleton.parents, jointed=head is not None)
     joints = [int(j) for j in np.unique(owner[owner >= 0])]
     if not joints:
         raise InputError(f"spacing: at {spacing:g} m no element fits inside a bone")
-    mesh = fitted(mesh, {j: mesh.elements[owner == j] for j in joints}, shafts, spacing)
+    mesh = fitted(mesh, {j: mesh.elements[owner == j] for j in joints if j not in own}, shafts, spacing)
     quality = mesh.scaled_jacobian()
     names = tuple(f"bone.{skeleton.names[j]}" for j in joints)
     sets = {n: np.unique(mesh.elements[owner == j]).astype(np.int32) for n, j in zip(names, joints, strict=True)}

@@ -33,13 +33,16 @@ class MeshTexture:
     corner_uv: NDArray[np.float32]
 
 
-def texture_atlas(covers: Sequence[tuple[SurfacePaint | None, int, tuple[int, int, int]]]) -> MeshTexture | None:
+def texture_atlas(
+    covers: Sequence[tuple[SurfacePaint | None, int, tuple[int, int, int]]], names: str = "it"
+) -> MeshTexture | None:
     """The textures of meshes that are drawn as one; None where none has any.
 
     Coordinates outside of 0…1 repeat the picture, whole triangles at a time.
 
     Args:
         covers: Of every mesh its paint, its number of triangles, and its colour where it has no paint.
+        names: What they are called, for messages.
 
     Raises:
         InputError: A picture that cannot be read.
@@ -56,7 +59,7 @@ def texture_atlas(covers: Sequence[tuple[SurfacePaint | None, int, tuple[int, in
         if paint is not None:
             painted = paint.image >= 0
             first = len(tiles)
-            tiles += [_decoded(data) for data in paint.images]
+            tiles += [_decoded(data, names) for data in paint.images]
             tile[painted] = first + paint.image[painted]
             own = paint.corner_uv[painted].astype(np.float64)
             uv[painted] = np.clip(own - np.floor(own.mean(axis=1, keepdims=True)), 0.0, 1.0)
@@ -80,7 +83,7 @@ def _packed(tiles: Sequence[NDArray[np.uint8]], uv: NDArray[np.float64], tile: N
     return MeshTexture(image, np.stack([across, up], axis=-1).astype(np.float32))
 
 
-def _decoded(data: bytes) -> NDArray[np.uint8]:
+def _decoded(data: bytes, names: str) -> NDArray[np.uint8]:
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -88,4 +91,6 @@ def _decoded(data: bytes) -> NDArray[np.uint8]:
             picture.thumbnail((_LARGEST, _LARGEST))
             return np.asarray(picture.convert("RGB"), np.uint8)
     except (OSError, UnidentifiedImageError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"a texture that cannot be read: {error}") from error
+        raise InputError(
+            f"{names}: a texture that cannot be read ({error}); COLOR gives a colour in its place"
+        ) from error

@@ -233,7 +233,7 @@ class Crowd:
             paint = paint_of_surface(surface) if color is None else None
             red, green, blue = ImageColor.getrgb(color or Style().skin)[:3]
             covers.append((paint, len(surface.faces), (red, green, blue)))
-        return texture_atlas(covers)
+        return texture_atlas(covers, " or ".join(role.actor.name for role in self.roles))
 
     def camera(self, camera: CameraSetting, size: tuple[int, int], frame: float | None = None) -> RenderCamera:
         """Render camera of a setting at a frame (the first one if left out).

@@ -121,7 +121,7 @@ def texture_of(prop: Prop) -> MeshTexture | None:
 
     red, green, blue = ImageColor.getrgb(prop.color)[:3]
     paint = None if prop.colored else prop.thing.paint
-    return texture_atlas([(paint, len(prop.thing.faces), (red, green, blue))])
+    return texture_atlas([(paint, len(prop.thing.faces), (red, green, blue))], prop.name)
 
 
 def prop_surface(prop: Prop) -> Surface:

@@ -6,6 +6,7 @@ Records that stem from a script carry the location of their command (``where``),
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -45,6 +46,7 @@ class FleshMaterial:
             its ball (thenar).
         segments: Segments of a body whose flesh is meshed, as ``left.forearm`` (see ``segment_joints``).
         flexion: Whether bending alone deforms it from the first frame on, before any contact (B §1).
+        bones: File with surfaces of its bones, in the units and axes of the rig's own file; None: round bones.
         element: Edge length of the elements [m].
         flesh: Young's modulus of the tissue between skin and bone [Pa]; default: subcutaneous tissue (Maeno 1998).
         skin: Young's modulus of the outermost layer of elements [Pa]; default: dermis (Maeno 1998).
@@ -61,6 +63,7 @@ class FleshMaterial:
     digits: tuple[str, ...] = ()
     segments: tuple[str, ...] = ()
     flexion: bool = False
+    bones: Path | None = None
     element: float = 0.003
     flesh: float = 34e3
     skin: float = 80e3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem.bone_surfaces import BoneSurface
 from warpjld.fem.contact.interface.pairs import Exclusion
 from warpjld.fem.flesh import Flesh, flesh_of
 from warpjld.fem.hand.blend import Moves, moves_of
@@ -173,6 +175,7 @@ def build_flesh_hand(
     head: float = 0.03,
     least: float = 0.1,
     apart: float = 2.5,
+    bones: Sequence[BoneSurface] = (),
 ) -> FleshHand:
     """Mesh a hand and prepare it to be driven by poses.
 
@@ -191,11 +194,12 @@ def build_flesh_hand(
         least: Smallest scaled Jacobian.
         apart: Skin closer at rest to another digit than this many spacings is web, which is excluded from contact with
             skin as close as that.
+        bones: Surfaces of bones, in place of round ones along their segments.
 
     Raises:
         InputError: A surface or spacing that cannot be meshed.
     """
-    flesh = flesh_of(rig, spacing, bone=bone, flush=flush, gap=gap, head=head, least=least)
+    flesh = flesh_of(rig, spacing, bone=bone, flush=flush, gap=gap, head=head, least=least, bones=bones)
     mesh = flesh.mesh
     faces = mesh.boundary()
     joints = [rig.skeleton.names[j] for j in flesh.bones]

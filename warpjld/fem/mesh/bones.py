@@ -126,6 +126,8 @@ def fitted(mesh: HexMesh, elements: Mapping[int, Ints32], bones: Mapping[int, Bo
         bones: Their shapes, under the same keys.
         spacing: Edge length of the elements [m].
     """
+    if not elements:
+        return mesh
     still = np.zeros(len(mesh.nodes), dtype=bool)
     still[mesh.quads(mesh.boundary())] = True
     hulls = [_Hull.of(mesh, own, bones[key], spacing, still) for key, own in elements.items()]

@@ -104,7 +104,8 @@ def _with_region(
     "FLESH",
     syntax=(
         "FLESH <actor> [THUMB/INDEX/MIDDLE/RING/PINKY/PALM … or <segment> …] [ELEMENT <metres>] [YOUNG <pascals>] "
-        "[SKIN <pascals>] [POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>] [FLEXION]"
+        "[SKIN <pascals>] [POISSON <ratio>] [STIFFENING <exponent>] [ITSELF <ON/OFF>] [FLEXION] "
+        '[BONES "<surface file>"]'
     ),
     help="Make an actor's flesh deformable: all, or the digits, palm and segments named; FLEXION: by bending too.",
     group="Contact",
@@ -130,6 +131,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
         stiffening=lambda: arguments.number("the exponent of Fung's law", minimum=0.0, maximum=100.0),
         itself=lambda: arguments.choice("ON or OFF", ("ON", "OFF")) == "ON",
         flexion=lambda: True,
+        bones=lambda: arguments.input_file("a file of bones"),
     )
     if "young" in options:
         options["flesh"] = options.pop("young")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.fem import Body, Material, Prescribed
+from warpjld.fem.bone_surfaces import read_bones
 from warpjld.fem.hand.alone import FleshAlone
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.cushion import coarse_note
@@ -182,8 +183,9 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         )
     if (coarse := coarse_note(flesh.cushions, element, material.digits)) is not None:
         notes.append(f"{actor.name}: {coarse}")
-    if flesh.gap > 0.5 * element:
-        notes.append(f"{actor.name}: the volume stays up to {1e3 * flesh.gap:.1f} mm off the skin where it folds")
+    gap = flesh.gap if part is None else part.gap(flesh.hand, skin, part.ends(flesh.built, element))
+    if gap > 0.5 * element:
+        notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
     built = flesh.built
     if part is None:
         shape = cut_to_digits(flesh.hand, poses, skin, material.digits)
@@ -215,11 +217,16 @@ def _meshed(
     failure: InputError | None = None
     for share in _SIZES:
         element = share * material.element
+        bones = () if material.bones is None else read_bones(material.bones, actor.rig)
         try:
             if not material.segments:
-                return resting_flesh(actor.rig, element, actor.name.lower(), poses, skin), element, None
+                return resting_flesh(actor.rig, element, actor.name.lower(), poses, skin, bones), element, None
             part = segment_surface(actor.rig, actor.covering, material.segments, element)
-            return resting_flesh(part.rig, element, actor.name.lower(), poses, skin[part.vertices]), element, part
+            return (
+                resting_flesh(part.rig, element, actor.name.lower(), poses, skin[part.vertices], bones),
+                element,
+                part,
+            )
         except InputError as error:
             failure = failure or error
     assert failure is not None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.fem.bone_surfaces import BoneSurface, SurfaceBone
 from warpjld.fem.flesh import Flesh
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.cushion import Cushion, cushions
@@ -67,13 +69,20 @@ class _Posed:
     gap: float
 
 
-_CLASSES = (_Meshed, Flesh, HexMesh, Bone, Embedding, Fit, Moves, Cushion)
+_CLASSES = (_Meshed, Flesh, HexMesh, Bone, SurfaceBone, BoneSurface, Embedding, Fit, Moves, Cushion)
 """Record types that the cache file of a mesh may contain."""
 _SHARED = ("place", "weights", "skin_faces", "skin_labels", "label_names", "excluded", "skin_fringes")
 """Fields that ``FleshHand`` and ``_Meshed`` have in common."""
 
 
-def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArray[np.float64]) -> RestingFlesh:
+def resting_flesh(
+    rig: Rig,
+    element: float,
+    name: str,
+    poses: Poses,
+    skin: NDArray[np.float64],
+    bones: Sequence[BoneSurface] = (),
+) -> RestingFlesh:
     """Flesh of a rig, meshed at its rest and carried to a pose; read from the cache if it is there.
 
     Args:
@@ -82,17 +91,19 @@ def resting_flesh(rig: Rig, element: float, name: str, poses: Poses, skin: NDArr
         name: See ``build_flesh_hand``.
         poses: The pose (a batch of one).
         skin: Its surface in that pose [m], shape (V, 3).
+        bones: Surfaces of its bones, if there are any; otherwise bones are round.
 
     Raises:
         InputError: It cannot be meshed, or not in that pose.
     """
 
     def mesh() -> _Meshed:
-        hand = build_flesh_hand(rig, element, name=name)
+        hand = build_flesh_hand(rig, element, name=name, bones=bones)
         parts = {part: getattr(hand, part) for part in _SHARED}
         return _Meshed(flesh=hand.flesh, cushions=cushions(hand), **parts)
 
-    key = hash_of(rig.surface.vertices, rig.surface.faces, rig.skeleton, element, name)
+    shapes = tuple((one.name, one.vertices, one.faces) for one in bones)
+    key = hash_of(rig.surface.vertices, rig.surface.faces, rig.skeleton, element, name, shapes)
     meshed, notes = kept_value("flesh", key, _CLASSES, mesh, modules=MESHING)
     parts = {part: getattr(meshed, part) for part in _SHARED}
     built = FleshHand(name=name, flesh=meshed.flesh, skeleton=rig.skeleton, surface=rig.surface, **parts)

@@ -10,6 +10,8 @@ MESHING = (
     "files/*.py",
     "geometry/*.py",
     "grasp/objects.py",
+    "grasp/pieces.py",
+    "io/mesh_file.py",
     "rig/*.py",
     "runtime/*.py",
     "simulation/**/*.py",

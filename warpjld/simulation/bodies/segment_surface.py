@@ -70,6 +70,14 @@ class SegmentSurface:
         away = np.linalg.norm(hand.mesh.nodes[outer] - found.closest, axis=1)
         return outer[away > _RIM * spacing].astype(np.int64)
 
+    def gap(self, hand: FleshHand, skin: NDArray[np.float64], ends: NDArray[np.int64]) -> float:
+        """Greatest distance of a posed mesh's skin nodes, its ends apart, from the rig's skin there (V, 3) [m]."""
+        from warpjld.fem.contact.obstacles.facets import Facets
+
+        outer = np.setdiff1d(np.unique(hand.mesh.quads(hand.skin_faces)), ends)
+        there = Facets(skin[self.vertices], self.rig.surface.faces).project(hand.mesh.nodes[outer])
+        return float(np.linalg.norm(hand.mesh.nodes[outer] - there.closest, axis=1).max(initial=0.0))
+
 
 def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spacing: float) -> SegmentSurface:
     """The skin of named segments (``segment_joints`` has the words), and a margin around it.

@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,9 @@ def identity_of(model: ContactModel, contact: ContactSpecification, frames: Sequ
         two = " ".join(sorted((owner.slave, owner.master)))
         parts[f"FRICTION {two}"] = pair.friction
         parts[f"BOND {two}"] = None if pair.bond is None else [pair.bond.normal, pair.bond.shear]
-    out = {name: hashlib.sha256(json.dumps(value).encode()).hexdigest() for name, value in parts.items()}
+    out = {
+        name: hashlib.sha256(json.dumps(value, default=_plain).encode()).hexdigest() for name, value in parts.items()
+    }
     mesh = model.body.mesh
     for one in model.bodies:
         rows = model.spans[one.name]
@@ -84,6 +87,13 @@ def _settings(contact: ContactSpecification) -> Iterator[tuple[str, Any]]:
     yield "GRAVITY", contact.pull
     yield "STRENGTH", contact.strength
     yield "GRASP", list(contact.grasped)
+
+
+def _plain(value: Any) -> Any:
+    """What is no plain value: a file by its name, a record by its fields."""
+    if isinstance(value, Path):
+        return value.name
+    return {one.name: getattr(value, one.name) for one in fields(value) if one.name not in _SILENT}
 
 
 def _sampled(known: Sequence[Prescribed]) -> Iterator[NDArray[Any]]:
