@@ -111,7 +111,7 @@ def test_bare_lists_are_told_apart_by_their_bends_and_play_at_the_rate_asked_for
         path = save(tmp_path, landmarks(side).tolist())
         loaded = load_motion(path, rig(hand(side)))
         np.testing.assert_allclose(bends(loaded.poses), bends(postures(hand("right"), "right", NAMES)), atol=1e-6)
-        assert "taken as 30 frames a second" in loaded.notes[0]
+        assert "assumed 30 frames a second" in loaded.notes[0]
         assert f"fingers bend as a {side} hand's" in loaded.notes[-1]
         assert (len(load_motion(path, rig(hand(side)), rate=12).poses), loaded.rate) == (len(NAMES), 30.0)
         np.savez(tmp_path / "a.npz", landmarks=landmarks(side))

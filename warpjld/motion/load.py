@@ -105,7 +105,9 @@ def load_motion(
     suffix = path.suffix.lower()
     if suffix in (".pkl", ".pickle"):
         raise InputError(
-            "is a pickle, which may run any code, and is not read; save plain arrays as .npz, or JSON", path=path
+            "contains pickled Python objects, which may run any code, and is not read; "
+            "save plain arrays as .npz, or JSON",
+            path=path,
         )
     if suffix not in MOTION_FORMATS:
         known = ", ".join(f"{s} ({what})" for s, what in MOTION_FORMATS.items())
