@@ -39,14 +39,16 @@ from u itself, prescribed values yet to go to their place:
    In either phase friction follows the present pressure (coupled) once the same points touch, slide and stick in turn
    after turn: Tresca's bound, taken from the solve before, leaves up to .7 of the error each time. Where points that
    stick come and go by it, the bound is taken from the solve before again.
-   A search whose points, found afresh, do not agree goes on in this phase, twice at most.
+   A search whose points, found afresh, do not agree goes on in this phase, twice at most; before that, points are seen
+   afresh once a node has gone a twentieth of an edge from where they were seen.
+   In the end (2), (3) are asked of slip as it is: what the multipliers took to slide one way may slide another.
 6. Bonds whose traction is too much are broken, and the step is found again; a step that fails is taken in halves.
 
 ``contact_system`` has (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` has f_int, f_ext and K;
 ``unconstrained`` steadies bodies that only contact holds, and says why none was found: falls, slides, or is blocked;
 ``statics`` proves that friction cannot hold a body before that is said. ``passing`` cuts steps longer than contact can
 follow (``course`` says where bodies are going) and finds nodes deep in another body, ``first_touch`` when in a step
-friction takes hold of what was apart.
+friction takes hold of what was apart, ``unresolved`` what is finer than the faces that are to see it.
 
 - P. Alart, A. Curnier 1991, A mixed formulation for frictional contact problems prone to Newton like solution methods,
   Comput. Methods Appl. Mech. Eng. 92, 353–375.
