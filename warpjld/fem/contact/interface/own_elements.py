@@ -17,7 +17,7 @@ _WITHIN = 1.0 + 1e-6
 """Natural coordinates that are within: a node on the face between two elements lies in both."""
 
 
-def inside_own(x: Array, elements: Ints32, nodes: Ints) -> Mask:
+def inside_own(x: Array, elements: Ints32, nodes: Ints | Ints32) -> Mask:
     """Which nodes lie in an element that they are no corner of, shape (n,).
 
     Args:
