@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import named, together
-from warpjld.fem import LinearElastic, Loads, NeoHooke, Prescribed, SolveStatus, box_hexes, prescribe
+from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, Prescribed, SolveStatus, box_hexes, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
+from warpjld.fem.contact.interface.contact_interface import interfaces_of
+from warpjld.fem.contact.interface.own_elements import inside_own
 from warpjld.fem.contact.obstacles.solids import Box
+from warpjld.fem.contact.solver.passing import Passing
 
 RUBBER = LinearElastic(1e6, 0.3)
 SAME = 0.02
@@ -119,3 +124,27 @@ def test_sides_that_are_both_prescribed_may_graze(depth: float, status: SolveSta
     assert found.status is status, found.message
     if status is SolveStatus.CONVERGED:
         assert found.last.touches[0].normal_force == 0.0
+
+
+def test_ends_of_a_ring_are_seen_to_pass_through_each_other() -> None:
+    """A ring with a gap of 40°, one body with itself, whose ends go past each other, or stop before they meet."""
+    mesh = box_hexes((1.0, 0.004, 0.01), (16, 2, 2))
+    along, out, across = (mesh.nodes - mesh.nodes.min(axis=0)).T
+    angle, radius = np.radians(20.0 + 320.0 * along), 0.02 + out
+    mesh = replace(mesh, nodes=np.stack([radius * np.cos(angle), radius * np.sin(angle), -across], axis=1))
+    passing = Passing(Body(mesh, NeoHooke(1e6, 0.3)), interfaces_of(mesh, [Pair("x-", "x+", name="ends")], 1))
+    past = np.zeros((len(along), 3))
+    past[:, 1] = 0.02 * np.sign(along - 0.5) * abs(2.0 * along - 1.0) ** 3  # ends lie at ∓.007 m
+    assert passing.went_through(np.zeros(past.size), past.ravel(), 0.0, 1.0)
+    assert not passing.went_through(np.zeros(past.size), 0.3 * past.ravel(), 0.0, 1.0)
+
+
+def test_nodes_in_elements_of_their_own_body() -> None:
+    """A row of elements of which the last is folded back over the first by a fifth."""
+    mesh = box_hexes((4.0, 1.0, 1.0), (4, 1, 1))
+    x = mesh.nodes.copy()
+    moved = x[:, 0] > 2.5
+    x[moved] -= [2.8, 0.3, 0.2]
+    found = inside_own(x, mesh.elements, np.arange(len(x)))
+    inside = {tuple(place) for place in x[found].round(6)}
+    assert {(0.2, 0.7, 0.8), (1.2, 0.7, 0.8), (1.0, 0.0, 0.0)} == inside

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.fem.contact.bodies import FREE
-from warpjld.fem import Body, LinearElastic, Loads, SolveStatus, box_hexes
+from tests.fem.contact.bodies import FREE, named, together
+from warpjld.fem import Body, LinearElastic, Loads, NeoHooke, SolveStatus, box_hexes, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.interface.contact_interface import interfaces_of
 from warpjld.fem.contact.obstacles.solids import Plane
@@ -35,6 +37,28 @@ def test_below_the_limit_of_the_slope_it_stays(friction: float, share: float) ->
     touch = found.last.touches[0]
     pulled = np.linalg.norm(touch.force[:2]) / touch.normal_force
     assert pulled == pytest.approx(share * friction, rel=2e-3)
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.9])
+def test_two_meshes_on_a_slope(friction: float) -> None:
+    """A block of 3 × 3 × 2 elements on one that deforms as well, at 85 % of the limit."""
+    upper = named(box_hexes((0.1, 0.1, 0.05), (3, 3, 2)), "upper", (0.05, 0.05, 0.05))
+    lower = named(box_hexes((0.2, 0.2, 0.05), (5, 5, 2)), "lower")
+    body = together({"upper": (upper, NeoHooke(1e5, 0.3)), "lower": (lower, NeoHooke(1e5, 0.3))})
+    held = prescribe(body.mesh, "lower.z-", x=0.0, y=0.0, z=0.0)
+    pull = Loads(gravity=tuple(gravity(np.arctan(0.85 * friction))))
+    touch = press(body, held, [Pair("upper.z-", "lower.z+", friction=friction)], pull).last.touches[0]
+    assert np.linalg.norm(touch.force[:2]) / touch.normal_force == pytest.approx(0.85 * friction, rel=0.01)
+
+
+@pytest.mark.parametrize("young", [1e4, 1e9])
+def test_far_from_the_origin_it_stays_too(young: float) -> None:
+    """5000 lengths away; positions are rounded there, and forces are not."""
+    mesh, away = box_hexes((0.1, 0.1, 0.05), (3, 3, 2)), np.array([500.0, 150.0, -100.0])
+    body = Body(replace(mesh, nodes=mesh.nodes + away), NeoHooke(young, 0.3))
+    pull = Loads(gravity=(3.0, 0.0, -9.81))
+    found = press(body, FREE, [Pair("z-", Plane(away, (0, 0, 1)), friction=0.6)], pull)
+    np.testing.assert_allclose(found.last.touches[0].force, [-1.5, 0.0, 4.905], atol=1e-4)
 
 
 @pytest.mark.parametrize(("height", "friction", "slope", "holds"), [

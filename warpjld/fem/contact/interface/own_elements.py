@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
+from warpjld.fem.mesh.shape import shape_at, slope_at
 
 __all__ = ["inside_own"]
 
@@ -12,10 +13,11 @@ _CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
 )
 _ROUNDS = 8
-_WITHIN = 1.0 - 1e-6
+_WITHIN = 1.0 + 1e-6
+"""Natural coordinates that are within: a node on the face between two elements lies in both."""
 
 
-def inside_own(x: Array, elements: Ints32, nodes: Ints) -> Mask:
+def inside_own(x: Array, elements: Ints32, nodes: Ints | Ints32) -> Mask:
     """Which nodes lie in an element that they are no corner of, shape (n,).
 
     Args:
@@ -34,7 +36,8 @@ def inside_own(x: Array, elements: Ints32, nodes: Ints) -> Mask:
     element = np.concatenate([np.asarray(some, dtype=np.int64) for some in near]) if len(which) else which
     at = x[nodes[which]]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    kept = ((at > low[element]) & (at < high[element])).all(axis=1)
+    slack = 1e-6 * radius[element, None]
+    kept = ((at > low[element] - slack) & (at < high[element] + slack)).all(axis=1)
     kept &= (elements[element] != nodes[which, None]).all(axis=1)
     which, element, at = which[kept], element[kept], at[kept]
     place = _natural(corners[element], at)
@@ -47,11 +50,9 @@ def _natural(corners: Array, at: Array) -> Array:
     """Natural coordinates of points (n, 3) in hexahedra with corners (n, 8, 3), by Newton's method, shape (n, 3)."""
     place = np.zeros_like(at)
     for _ in range(_ROUNDS):
-        factors = 1.0 + place[:, None] * _CORNERS
-        shape = factors.prod(axis=2) / 8.0
-        slope = np.stack([_CORNERS[:, k] * np.delete(factors, k, axis=2).prod(axis=2) / 8.0 for k in range(3)], axis=2)
+        shape, slope = shape_at(place), slope_at(place)
         jacobian = np.einsum("nai,nak->nik", corners, slope)
         left = at - np.einsum("na,nai->ni", shape, corners)
-        step = np.linalg.solve(jacobian, left[:, :, None])[:, :, 0]
+        step = (np.linalg.pinv(jacobian) @ left[:, :, None])[:, :, 0]  # elements may have no volume
         place = np.clip(place + step, -3.0, 3.0)
     return place

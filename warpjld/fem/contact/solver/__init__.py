@@ -42,14 +42,18 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
    In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points
    touch, slide and stick in successive iterations, as iterating over Tresca bounds leaves up to 0.7 of the error each
    time. If sticking points change because of that, the bound is taken from the previous solve again.
-   A search whose contact points, searched again, do not agree continues in this phase, at most twice.
+   A search whose contact points, searched again, do not agree continues in this phase, at most twice; before that,
+   points are searched again once a node has moved a twentieth of an edge since they were found.
+   At convergence (2), (3) are evaluated once more at the slip found (``confirmed``): what the multipliers took to slide
+   one way may slide another.
 6. Bonds whose traction exceeds their strength are broken and the step is solved again; a step that fails is halved.
 
 ``contact_system`` evaluates (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` f_int, f_ext and K.
 ``unconstrained`` stabilises bodies held by contact alone, and explains a failure: unheld, sliding or blocked;
 ``statics`` proves that friction cannot hold a body before that is reported. ``passing`` cuts steps longer than contact
 search can follow (by the ``predicted_motion``) and finds nodes deep inside another body; ``first_touch`` finds when
-in a step frictional contact begins; ``friction_continuation`` helps where friction alone holds a body.
+in a step frictional contact begins; ``friction_continuation`` helps where friction alone holds a body; ``unresolved``
+finds corners and edges that the mesh is too coarse to resolve.
 
 Numeric constants of these modules have their units in brackets, none if they are dimensionless; those without a stated
 reason or source are assumed.
