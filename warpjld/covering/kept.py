@@ -133,6 +133,8 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
     try:
         if path.is_file() and not zipfile.is_zipfile(path):
             raise ValueError("not an NPZ archive")
+        if not path.exists():
+            raise InputError("no such file", path=path)
         arrays = read_arrays(path)
         if str(arrays["format"]) != _FORMAT:
             raise InputError("not a binding of this version", path=path)
@@ -146,8 +148,6 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
         chosen = rig.skeleton if skeleton is None else skeleton
         covering = Covering(chosen, rig.surface, parameters, fans(chosen), domains, anchors)
         _check(covering, runs, kept, swelling)
-    except FileNotFoundError:
-        raise InputError("no such file", path=path) from None
     except InputError as error:
         raise InputError(error.message, path=path) from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
