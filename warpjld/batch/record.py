@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from warpjld.errors import InputError
 from warpjld.files.manifest import file_hash, write_json
+from warpjld.files.text_file import read_json
 from warpjld.io.identity import content_hash
 
 __all__ = ["FOLDER", "ClipRecord", "read_record", "still_there", "write_record"]
@@ -60,9 +61,23 @@ def write_record(out: Path, record: ClipRecord) -> None:
 def read_record(out: Path, name: str) -> ClipRecord | None:
     """A clip's record; None if there is none that can be read."""
     try:
-        return ClipRecord(**json.loads((out / FOLDER / f"{name}.json").read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+        record = ClipRecord(**read_json(out / FOLDER / f"{name}.json"))
+    except (InputError, TypeError):
         return None
+    return record if _is_sound(record) else None
+
+
+def _is_sound(record: ClipRecord) -> bool:
+    """Whether all that a record says is of the type that it should be, and its names may be those of files."""
+    texts: list[object] = [record.name, record.motion, record.motion_sha256, record.status, record.message]
+    lists: tuple[object, ...] = (record.warnings, record.notes)
+    if not all(isinstance(one, list) for one in lists) or not isinstance(record.files, dict):
+        return False
+    texts += [*record.warnings, *record.notes, *record.files, *record.files.values(), record.animation or ""]
+    numbers: tuple[object, ...] = (record.frames, record.rate)
+    return all(isinstance(one, str) and "\0" not in one for one in texts) and all(
+        isinstance(one, int | float) for one in numbers
+    )
 
 
 def still_there(out: Path, record: ClipRecord) -> bool:

@@ -58,7 +58,7 @@ def _check_slots(slots: NDArray[np.int32], counts: list[int], columns: Columns) 
         begin += count
 
 
-def check_anchors(anchors: Anchors, skeleton: Skeleton, fans: int) -> None:
+def check_anchors(anchors: Anchors, skeleton: Skeleton) -> None:
     """Make sure that coordinates of vertices are those of a skeleton's segments.
 
     Raises:
@@ -66,7 +66,7 @@ def check_anchors(anchors: Anchors, skeleton: Skeleton, fans: int) -> None:
     """
     count, segments, pairs = len(anchors.rest), len(anchors.ends), len(anchors.pairs)
     joints = (0, len(skeleton))
-    check_array("ends", anchors.ends, (fans, 2), np.int32, within=joints)
+    check_array("ends", anchors.ends, (None, 2), np.int32, within=joints)
     check_array("pairs", anchors.pairs, (None, 2), np.int32, within=(0, segments))
     for name in ("muscle", "stiff"):
         check_array(name, getattr(anchors, name), (segments,), np.bool_)

@@ -133,6 +133,8 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
     try:
         if path.is_file() and not zipfile.is_zipfile(path):
             raise ValueError("not an NPZ archive")
+        if not path.exists():
+            raise InputError("no such file", path=path)
         arrays = read_arrays(path)
         if str(arrays["format"]) != _FORMAT:
             raise InputError("not a binding of this version", path=path)
@@ -146,8 +148,6 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
         chosen = rig.skeleton if skeleton is None else skeleton
         covering = Covering(chosen, rig.surface, parameters, fans(chosen), domains, anchors)
         _check(covering, runs, kept, swelling)
-    except FileNotFoundError:
-        raise InputError("no such file", path=path) from None
     except InputError as error:
         raise InputError(error.message, path=path) from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
@@ -157,17 +157,17 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
 
 def _check(covering: Covering, runs: Runs, kept: _KeptFields, swelling: NDArray[np.float64]) -> None:
     """Make sure that all fits the rig, and that no index lies outside its array; ValueError or InputError otherwise."""
-    skeleton, count, segments = covering.skeleton, len(covering.surface.vertices), len(covering.fans)
+    skeleton, count, segments = covering.skeleton, len(covering.surface.vertices), len(covering.anchors.ends)
     joints, stations = len(skeleton), STATIONS * len(covering.anchors.pairs)
     for name, array in vars(default_parameters(skeleton)).items():
         check_array(name, getattr(covering.parameters, name), array.shape, np.float64)
     covering.parameters.check(skeleton)
-    check_anchors(covering.anchors, skeleton, segments)
+    check_anchors(covering.anchors, skeleton)
     check_runs(runs, skeleton, covering.anchors, count)
     widths = (joints, 2 * joints, joints, joints, stations, segments)
     for kind, width in zip(_FIELDS, widths, strict=True):
         check_sparse(kind, kept.arrays[kind], (count, width))
-    check_array("domains", covering.domains, (count, segments), np.float64)
+    check_array("domains", covering.domains, (count, len(covering.fans)), np.float64)
     check_array("swelling", swelling, (joints,), np.float64)
 
 

@@ -30,6 +30,10 @@ SHIPPED = (
 """Names of the poses that come with the package."""
 
 
+_MOST = 1e6
+"""Degrees, either way, that an angle may have: more is a mistake."""
+
+
 def hand_channels(actor: Actor, side: str) -> dict[str, tuple[float, float]]:
     """Movable channels of the digits of one hand, such as ``index.base.flexion``, with their limits [degrees]."""
     found = {}
@@ -85,6 +89,7 @@ def _angles(content: object, path: Path) -> dict[str, float]:
         parts = name.split(".")
         if len(parts) != 3 or parts[0] not in DIGITS or parts[2] not in CHANNELS:
             raise InputError(f"'{name}': want digit.joint.angle, such as index.base.flexion", path=path)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-            raise InputError(f"angle of '{name}': want a number of degrees, got {value!r}", path=path)
+        good = not isinstance(value, bool) and isinstance(value, int | float)
+        if not good or not -_MOST <= value <= _MOST:
+            raise InputError(f"angle of '{name}': want a number of degrees, got {value!r:.60}", path=path)
     return {name: float(value) for name, value in angles.items()}

@@ -36,6 +36,8 @@ def check_schema(content: dict[str, Any]) -> None:
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             raise InputError(f"is not a glTF 2.0 file: '{name}' is no list of objects")
         for number, row in enumerate(rows):
+            if not isinstance(row.get("name", ""), str | None):
+                raise InputError(f"is not a glTF 2.0 file: {name}[{number}].name is no text")
             for key in _WHOLE.get(name, ()):
                 _check_whole(row.get(key), f"{name}[{number}].{key}")
     check_limit("nodes", len(content.get("nodes") or ()))
