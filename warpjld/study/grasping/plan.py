@@ -12,7 +12,7 @@ from warpjld.files.toml_table import TomlTable, read_toml
 from warpjld.skeleton import CHANNELS, DIGITS
 from warpjld.skeleton.hand import HAND_PARENTS
 from warpjld.study.grasping.choices import HandChoice, ObjectChoice, read_hand, read_object
-from warpjld.study.grasping.pressing import Pressing, read_pressing
+from warpjld.study.grasping.pressing import ContactPlan, read_pressing
 
 __all__ = ["COMPUTING", "GraspPlan", "Measuring", "WristRange", "load_plan"]
 
@@ -99,7 +99,7 @@ class GraspPlan:
     coupling: tuple[float, float]
     wrist: WristRange
     measuring: Measuring
-    pressing: Pressing | None = None
+    pressing: ContactPlan | None = None
 
     @property
     def combinations(self) -> int:

@@ -22,7 +22,7 @@ from warpjld.simulation.specification import (
 )
 from warpjld.skeleton import DIGITS
 from warpjld.study.grasping.load import Hand, Thing
-from warpjld.study.grasping.pressing import Pressing
+from warpjld.study.grasping.pressing import ContactPlan
 
 __all__ = ["press_grasp"]
 
@@ -46,7 +46,7 @@ def press_grasp(
     *,
     friction: float,
     weight: float,
-    how: Pressing,
+    how: ContactPlan,
 ) -> tuple[dict[str, Any], Array | None, str]:
     """Bend all digits on alike, as ``SQUEEZE … FORCE`` does, until they press with the force that a weight needs.
 
@@ -92,7 +92,7 @@ def press_grasp(
     return values, np.asarray(seen), message
 
 
-def _specification(hand: Hand, asked: float, friction: float, how: Pressing) -> ContactSpecification:
+def _specification(hand: Hand, asked: float, friction: float, how: ContactPlan) -> ContactSpecification:
     channels = tuple(f"{hand.side}.{digit}.{knuckle}.flexion" for digit in DIGITS for knuckle in _KNUCKLES)
     most = float(np.radians(how.most))
     grip = GripSpecification(_HAND, _OBJECT, _CLOSED, _CLOSED + 1, channels, most=most, force=asked)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from warpjld.files.toml_table import TomlTable
 
-__all__ = ["Pressing", "read_pressing"]
+__all__ = ["ContactPlan", "read_pressing"]
 
 _TOLERANCE = 0.1
 
 
 @dataclass(frozen=True)
-class Pressing:
+class ContactPlan:
     """Contact of flesh and object, solved for every grasp that succeeds; the object is rigid and does not move.
 
     Attributes:
@@ -37,17 +37,17 @@ class Pressing:
         return abs(force - asked) <= _TOLERANCE * asked
 
 
-def read_pressing(table: TomlTable) -> Pressing:
+def read_pressing(table: TomlTable) -> ContactPlan:
     """Settings from the table [contact]."""
     table.needed("weights")
     weights = table.numbers("weights", (), above=0.0)
 
     def number(key: str, *, above: float, most: float) -> float:
-        value = table.number(key, getattr(Pressing, key), above=above, most=most)
+        value = table.number(key, getattr(ContactPlan, key), above=above, most=most)
         assert value is not None
         return value
 
-    found = Pressing(
+    found = ContactPlan(
         weights=weights,
         margin=number("margin", above=0.0, most=100.0),
         element=number("element", above=0.0, most=0.02),
