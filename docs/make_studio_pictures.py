@@ -54,7 +54,9 @@ def library(page: Any, room: Room) -> None:
     """Pictures of the poses."""
     page.get_by_text("Poses", exact=True).click()
     page.get_by_role("button", name="Pictures of the poses").click()
-    page.wait_for_function("document.querySelectorAll('img').length > 0", timeout=120_000)
+    page.get_by_role("button", name="Cancel").wait_for()
+    page.get_by_role("button", name="Cancel").wait_for(state="hidden")
+    page.get_by_role("button", name="Save pose").scroll_into_view_if_needed()
 
 
 def grasps(page: Any, room: Room) -> None:
@@ -64,6 +66,7 @@ def grasps(page: Any, room: Room) -> None:
     page.get_by_role("button", name="auto", exact=True).click()
     page.get_by_role("button", name="Take it this way").wait_for(timeout=600_000)
     page.get_by_role("button", name="Cancel").wait_for(state="hidden", timeout=600_000)
+    page.get_by_role("button", name="Take it this way").scroll_into_view_if_needed()
 
 
 def script(page: Any, room: Room) -> None:
