@@ -128,7 +128,8 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         for name in names or documented:
             text, prepare = shots[name]
-            path = Path(folder) / "hand.jld"
+            path = Path(folder) / name / "hand.jld"  # what one leaves unsaved, the next does not find
+            path.parent.mkdir()
             path.write_text(text)
             room = Room(opened_document(path, Path(folder) / "out"), port=0)
             page = browser.new_page(viewport=SIZE)
