@@ -54,7 +54,9 @@ def library(page: Any, room: Room) -> None:
     """Pictures of the poses."""
     page.get_by_text("Poses", exact=True).click()
     page.get_by_role("button", name="Pictures of the poses").click()
-    page.wait_for_function("document.querySelectorAll('img').length > 0", timeout=120_000)
+    page.get_by_role("button", name="Cancel").wait_for()
+    page.get_by_role("button", name="Cancel").wait_for(state="hidden")
+    page.get_by_role("button", name="Save pose").scroll_into_view_if_needed()
 
 
 def grasps(page: Any, room: Room) -> None:
@@ -64,6 +66,7 @@ def grasps(page: Any, room: Room) -> None:
     page.get_by_role("button", name="auto", exact=True).click()
     page.get_by_role("button", name="Take it this way").wait_for(timeout=600_000)
     page.get_by_role("button", name="Cancel").wait_for(state="hidden", timeout=600_000)
+    page.get_by_role("button", name="Take it this way").scroll_into_view_if_needed()
 
 
 def script(page: Any, room: Room) -> None:
@@ -125,7 +128,8 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         for name in names or documented:
             text, prepare = shots[name]
-            path = Path(folder) / "hand.jld"
+            path = Path(folder) / name / "hand.jld"  # what one leaves unsaved, the next does not find
+            path.parent.mkdir()
             path.write_text(text)
             room = Room(opened_document(path, Path(folder) / "out"), port=0)
             page = browser.new_page(viewport=SIZE)

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
+from warpjld.simulation.report.table import JointOpening
 from warpjld.studio.background import Background
 from warpjld.studio.document import ScriptDocument
-from warpjld.studio.making import pressed
+from warpjld.studio.making import Pressed, open_joints, pressed
 from warpjld.studio.state import StudioState
 
 HAND = "HAND LEFT BUILTIN RESOLUTION 1500\n"
@@ -35,8 +36,19 @@ def state(tmp_path: Path) -> StudioState:
 def test_contact_is_seen_as_it_was_solved_until_the_script_changes(state: StudioState) -> None:
     state.frame = 10
     before = {one.name: one.vertices for one in state.shown()}
-    state.solved = pressed(state.document.text, state.copied_scene(), quiet)
+    seen: list[Pressed] = []
+    state.solved = pressed(state.document.text, state.copied_scene(), quiet, seen.append)
+    assert state.solved.simulation is not None
+    frames = state.solved.simulation.solved.frames
+    assert [[f.frame for f in one.surfaces.frames] for one in seen] == [
+        [f.frame for f in frames[:k]] for k in range(1, len(frames) + 1)
+    ]
+    assert all(one.simulation is None and one.rows(10) == [] for one in seen)
     assert state.solved.rows(10)
+    points = state.contacts()
+    pad = state.scene.actors["LEFT"].skeleton.rest[state.scene.actors["LEFT"].skeleton.index("left.index.tip")]
+    assert 0 < len(points) < 200
+    assert np.linalg.norm(points - pad, axis=1).max() < 0.03
     after = {one.name: one.vertices for one in state.shown()}
     moved = np.linalg.norm(after["LEFT"] - before["LEFT"], axis=1)
     assert moved.max() > 1e-4
@@ -44,9 +56,32 @@ def test_contact_is_seen_as_it_was_solved_until_the_script_changes(state: Studio
     (colored,) = [one for one in state.shown() if one.colors is not None]
     assert colored.colors is not None
     assert len(np.unique(colored.colors, axis=0)) > 2
+    view = state.solved.simulation.show()
+    try:
+        assert view.address in view._repr_html_()
+        assert {*view._meshes} == {"LEFT", "PLATE"}
+        assert len(view._frames) == len(frames) + 1
+    finally:
+        view.close()
     state.do("RATE 25")
     assert state.pressed is None
     assert np.array_equal({one.name: one.vertices for one in state.shown()}["LEFT"], before["LEFT"])
+
+
+def test_joints_are_opened_as_suggested_inside_their_limits(tmp_path: Path) -> None:
+    text = f"{HAND}JOINT left.index.knuckle2 FLEXION AT 10 20\nJOINT left.ring.base FLEXION AT 10 -44\n"
+    state = StudioState(ScriptDocument(tmp_path / "a.jld", text), tmp_path / "out")
+    suggested = [
+        JointOpening("LEFT", 10.0, "left.index.knuckle2", 3.25, "open knuckle 2"),
+        JointOpening("LEFT", 10.0, "left.ring.base", 8.0, "open base"),
+    ]
+    assert open_joints(state, suggested)
+    low = state.channels()["left.ring.base.flexion"][0]
+    angles = state.angles(10.0)
+    assert angles["left.index.knuckle2.flexion"] == pytest.approx(16.75)
+    assert angles["left.ring.base.flexion"] == pytest.approx(max(-52.0, low))
+    state.undo()
+    assert state.document.text == text
 
 
 def test_without_press_there_is_nothing_to_solve(tmp_path: Path) -> None:

@@ -98,10 +98,11 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 
 def _light(server: Any) -> None:
-    """Light from all sides and one lamp over the shoulder, without shadows: what bends is seen, and drawn fast. Every
-    lamp more costs a browser without a graphics card a tenth of its frames."""
+    """Light from all sides, one lamp over the shoulder and one for the palm, without shadows: what bends is seen, and
+    drawn fast. Every lamp more costs a browser without a graphics card a tenth of its frames."""
     scene = server.scene
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
-    scene.add_light_hemisphere("/light/sky", sky_color=(255, 250, 244), ground_color=(148, 132, 140), intensity=1.5)
-    scene.add_light_directional("/light/lamp", intensity=2.4, position=(1.0, 2.0, 1.0))
+    scene.add_light_hemisphere("/light/sky", sky_color=(255, 250, 244), ground_color=(128, 112, 120), intensity=1.3)
+    scene.add_light_directional("/light/lamp", intensity=2.6, position=(-0.7, 1.8, 1.0))
+    scene.add_light_directional("/light/below", intensity=1.6, position=(1.0, -1.5, -0.3))
