@@ -16,9 +16,15 @@ from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import SceneAnimation, run_contact
 from warpjld.simulation.recorded import RecordedActor, RecordedAnimation, RecordedObject
 from warpjld.simulation.simulate import Simulation, simulate
-from warpjld.simulation.specification import ContactSpecification, FleshMaterial, ObjectMaterial, SolveSpecification
+from warpjld.simulation.specification import (
+    ContactSpecification,
+    FleshMaterial,
+    GripSpecification,
+    ObjectMaterial,
+    SolveSpecification,
+)
 from warpjld.simulation.state_variables import Points, PrescribedPoints
-from warpjld.skeleton import Poses
+from warpjld.skeleton import Poses, poses_from_angles
 
 EDGE, YOUNG, DEPTH = 0.02, 1e5, 5e-4
 
@@ -86,6 +92,16 @@ def test_names_that_differ_by_case_alone_are_refused() -> None:
     contact = ContactSpecification(physical={"Lid": solid, "lid": solid}, pressing=SolveSpecification(0, 1))
     with pytest.raises(InputError, match="two bodies are called lid"):
         simulate(contact, RecordedAnimation(objects=lids))
+
+
+def test_a_grip_of_recorded_poses_is_refused(rig: Rig) -> None:
+    flat = poses_from_angles(rig.skeleton, np.zeros((2, len(rig.skeleton), 4)))
+    grip = GripSpecification("LEFT", "", 1, 2, ("left.index.base.flexion",), most=0.1, force=1.0)
+    contact = ContactSpecification(
+        flesh={"LEFT": FleshMaterial(digits=("index",))}, grips=(grip,), pressing=SolveSpecification(0, 2)
+    )
+    with pytest.raises(InputError, match="LEFT is driven by recorded poses: a grip search needs joint angles"):
+        simulate(contact, RecordedAnimation([RecordedActor("LEFT", rig, poses=flat)]))
 
 
 @pytest.mark.slow

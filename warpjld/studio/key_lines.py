@@ -8,7 +8,7 @@ from collections.abc import Mapping
 __all__ = ["number", "with_keys", "with_values"]
 
 _VALUE = re.compile(
-    r"(?P<what>JOINT \S+ [A-Z]+ AT \S+|(?:MOVE|TURN) \S+ \S+|PARAMETER \S+ (?:INFLATION|MUSCLE|PEAK|PALM)) "
+    r"(?P<what>JOINT \S+ [A-Z]+ AT \S+|(?:MOVE|TURN) \S+ \S+|PARAMETER \S+ (?:INFLATION|PROXIMITY|MUSCLE|PEAK|PALM)) "
     r"[-+.\d\seE]+\Z"
 )
 

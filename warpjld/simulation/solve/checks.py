@@ -47,6 +47,8 @@ def check_specification(animation: Animation, contact: ContactSpecification, req
     for grip in contact.grips:
         try:
             _check_grip(contact, grip, request)
+            if not animation.actors[grip.actor].bendable:
+                raise InputError(f"actor {grip.actor} is driven by recorded poses: a grip search needs joint angles")
             if grip.first in begun:
                 raise InputError(f"another grip begins at frame {grip.first:g}")
         except InputError as error:
@@ -56,7 +58,7 @@ def check_specification(animation: Animation, contact: ContactSpecification, req
         raise InputError("CORRECT goes on from the frame before: the paper's method cannot")
     recorded = [name for name in contact.flesh if not animation.actors[name].bendable]
     if request.correct and recorded:
-        raise InputError(f"actor {recorded[0]} is driven by a MOTION file: no angle can be corrected")
+        raise InputError(f"actor {recorded[0]} is driven by recorded poses: there are no joint angles to correct")
 
 
 def _check_grip(contact: ContactSpecification, grip: GripSpecification, request: SolveSpecification) -> None:
