@@ -159,7 +159,7 @@ def test_overlap_of_sides_that_are_both_prescribed(beside: float) -> None:
     pair = Pair("z+", lid(0.1, height=0.5), name="lid")
     found = press(Body(mesh, NeoHooke(1.0, 0.3)), held, [pair], check=False)
     assert found.status is SolveStatus.BLOCKED
-    assert "contact 'lid': both sides are prescribed and overlap by 0.1 m" in found.message
+    assert "contact 'lid': both sides are prescribed and overlap by 100 mm" in found.message
     assert len(found.steps) == 0
 
 

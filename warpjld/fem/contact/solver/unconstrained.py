@@ -138,6 +138,5 @@ def blocked(
         deepest = int(np.argmax(depth))
         if depth[deepest] > max(GRAZING * interface.edge[p.sites[deepest]], worst):
             worst = float(depth[deepest])
-            node = interface.slave.nodes[int(np.argmax(interface.share[[p.sites[deepest]]].toarray()))]
-            words = f"{interface.pair.title}: both sides are prescribed and overlap by {worst:.3g} m at node {node}"
+            words = f"{interface.pair.title}: both sides are prescribed and overlap by {1e3 * worst:.3g} mm"
     return words
