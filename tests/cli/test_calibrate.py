@@ -103,8 +103,8 @@ def test_targets_for_people(hand: Path, shapes: Path, tmp_path: Path) -> None:
         (["builtin:middle"], "want builtin:left, builtin:right or builtin:body"),
         (["missing.glb"], "no such file"),
         (["builtin:left", "-o", "nowhere/at/all.json"], "no such folder"),
-        (["builtin:left", "--motion", "a.csv"], "which are not given"),
-        (["builtin:left", "--targets", "a.npz", "--poses", "3"], "all of the file's"),
+        (["builtin:left", "--motion", "a.csv"], "but there is no --targets"),
+        (["builtin:left", "--targets", "a.npz", "--poses", "3"], "all poses of the file are used"),
         (["builtin:left", "--targets", "none.npz"], "cannot be read"),
     ],
 )

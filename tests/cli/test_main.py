@@ -29,7 +29,7 @@ def test_help_lists_every_command_and_the_units(capsys: pytest.CaptureFixture[st
     assert run("--help") == 0
     said = capsys.readouterr().out
     assert [line.split()[0] for line in said.splitlines() if line.strip().startswith(tuple(COMMANDS))] == COMMANDS
-    assert "Metres, degrees" in said
+    assert "lengths are metres, angles degrees" in said
 
 
 @pytest.mark.parametrize("name", COMMANDS)

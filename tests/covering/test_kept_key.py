@@ -23,7 +23,8 @@ def _imported(module: str, file: Path) -> set[str]:
             assert not node.level, f"{module}: relative import"
             assert node.module is not None
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return {name for name in found if name.partition(".")[0] in _PACKAGES}
+    # how a covering is shown is no part of binding
+    return {n for n in found if n.partition(".")[0] in _PACKAGES and not n.startswith("warpjld.page")}
 
 
 def _file(module: str) -> Path | None:

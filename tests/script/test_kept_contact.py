@@ -95,10 +95,10 @@ def interrupting(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
     """Ctrl-C after a frame's equilibrium is found and before it counts as done."""
     solved_frame = solve_frames.solved_frame
 
-    def solved(frame: float, instants: Any) -> Any:
+    def solved(frame: float, instants: Any, states: Any) -> Any:
         if frame == at:
             raise KeyboardInterrupt
-        return solved_frame(frame, instants)
+        return solved_frame(frame, instants, states)
 
     monkeypatch.setattr(solve_frames, "solved_frame", solved)
 

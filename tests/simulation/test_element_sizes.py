@@ -15,7 +15,7 @@ from warpjld.simulation.specification import FleshMaterial
 def meshed(monkeypatch: pytest.MonkeyPatch, good: float) -> float:
     """Edge of the elements where only those up to ``good`` make a mesh."""
 
-    def mesh(rig: object, element: float, name: str, poses: object, skin: object) -> str:
+    def mesh(rig: object, element: float, name: str, poses: object, skin: object, bones: object) -> str:
         if element > good:
             raise InputError(
                 f"mesh: least scaled Jacobian 0.01 below 0.1: a smaller spacing than {element:g} m is needed"

@@ -131,7 +131,7 @@ def test_deep_overlaps_are_taken_in_shorter_steps():
 def test_how_it_failed_is_told():
     found = _press(0.1)
     assert re.search(r"did not settle in \d+ turns: each turn moves [\d.]+ times as far", found.message)
-    assert "relax it after Aitken" in found.message
+    assert "use Aitken relaxation" in found.message
     body, fixed = _blocks(0.1)
     with pytest.raises(ContactError, match="did not settle"):
         press(body, fixed, [Pair("upper.z-", "lower.z+")], method="paper")

@@ -11,7 +11,7 @@ MESHING = (
     "geometry/*.py",
     "grasp/objects.py",
     "grasp/pieces.py",
-    "io/mesh_file.py",
+    "io/**/*.py",
     "rig/*.py",
     "runtime/*.py",
     "simulation/**/*.py",
