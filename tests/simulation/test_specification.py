@@ -157,7 +157,10 @@ def test_grips_hold_their_angles_until_something_is_found(run) -> None:
         ("PHYSICAL ball HOLLOW 0.03", r"a wall must be thinner than half of BALL, 0.03 m"),
         ("PHYSICAL ball PRESSURE 1000", r"only a hollow object has an inside"),
         ("FLESH right", r"4:7: there is no actor right"),
-        ("FLESH left TOE", r"expected an option \(ELEMENT/YOUNG/SKIN/POISSON/STIFFENING/ITSELF/FLEXION/BONES\), found TOE"),
+        (
+            "FLESH left TOE",
+            r"expected an option \(ELEMENT/YOUNG/SKIN/POISSON/STIFFENING/ITSELF/FLEXION/BONES\), found TOE",
+        ),
         ("FLESH left INDX", r"found INDX; did you mean INDEX"),
         ("FLESH left\nPRESS 0 4\nPRESS 2 4", r"6:1: line 5 asks for frames 0 to 4 already: one PRESS is enough"),
         ("FRICTION left ball nan", r"expected the coefficient of friction, found nan"),

@@ -39,9 +39,12 @@ def fem_command(study: Path, out: Path | None, no_pictures: bool, as_json: bool,
     from rich.console import Console
 
     from warpjld.cli.answer import answer
+    from warpjld.fem import MaterialWarning
+    from warpjld.fem.contact import ContactWarning
     from warpjld.fem.study.study_file import load_study
     from warpjld.fem.study.study_results import StudyResults
     from warpjld.runtime.quiet import silence_warp
+    from warpjld.runtime.warning_texts import warning_texts
     from warpjld.script.folder import OutputFolder
 
     silence_warp()
@@ -63,8 +66,12 @@ def fem_command(study: Path, out: Path | None, no_pictures: bool, as_json: bool,
     with OutputFolder(folder) as out_folder:
         results = StudyResults(loaded, out_folder.work, study.stem, pictures=not no_pictures)
         try:
-            for reached in loaded.run(lambda text: console.print(f"  {text}")):
-                results.add(reached)
+            with warning_texts(ContactWarning, MaterialWarning) as warned:
+                for reached in loaded.run(lambda text: console.print(f"  {text}")):
+                    results.add(reached)
+                    for text in warned():
+                        notes.append(text)
+                        console.print(f"note: {text}")
         except KeyboardInterrupt:
             if results.last is None:
                 raise

@@ -27,8 +27,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.fem import MaterialWarning
+from warpjld.fem.contact import ContactWarning
 from warpjld.fem.hand.suggestions import DigitSlopes
 from warpjld.runtime.threads import one_blas_thread
+from warpjld.runtime.warning_texts import warning_texts
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import build_flesh_body
 from warpjld.simulation.bodies.model import ContactModel, assemble_model
@@ -257,6 +260,7 @@ def simulate(
 
     def watch(driven: ContactModel, frame: SolvedFrame) -> str | None:
         reason = table.add(driven, frame)
+        notes.extend(f"frame {frame.frame:g}: {text}" for text in warned())
         done.append(frame)
         showing(surfaces_of_frames(driven, done.copy(), before))
         return reason if request.stop else None
@@ -267,16 +271,17 @@ def simulate(
     checkpoint = CheckpointFile(
         folder / (request.state or KEPT), cache(partial(identity_of, model, specification, frames))
     )
-    solved = solve_frames(
-        model,
-        frames,
-        specification,
-        request,
-        watch=watch,
-        checkpoint=None if request.state is None else checkpoint,
-        saving=lambda save: keeping(lambda: checkpoint.path if save(checkpoint) else None),
-        progress=progress,
-    )
+    with warning_texts(ContactWarning, MaterialWarning) as warned:
+        solved = solve_frames(
+            model,
+            frames,
+            specification,
+            request,
+            watch=watch,
+            checkpoint=None if request.state is None else checkpoint,
+            saving=lambda save: keeping(lambda: checkpoint.path if save(checkpoint) else None),
+            progress=progress,
+        )
     before, solved = after_contact(solved, specification, request, before)
     return _report(solved, before, table, request, notes)
 
