@@ -219,12 +219,10 @@ def simulate(
     Args:
         specification: Materials, friction, grips; its ``pressing`` says which frames to solve.
         animation: Motion of all actors and objects: of a script, of arrays (``RecordedAnimation``), or another
-            implementation of the protocol. Edits by grip searches and corrections are applied to a copy and returned
-            (``solved.edits``).
+            implementation of the protocol. Edits are applied to a copy and returned (``solved.edits``).
         folder: Folder of the state file (``pressing.state``).
-        keeping: Called once before the first frame with a function that may be called at any time: it writes the frames
-            solved so far into the state file (``KEPT`` if none was asked for) and returns its path, or None if there is
-            nothing to resume from.
+        keeping: Called before the first frame with a function that writes the frames solved so far into the state file
+            (``KEPT`` if none was asked for) and returns its path, None if there is nothing to resume from.
         showing: Called after each frame with the surfaces of the frames solved so far.
         progress: Called with what is being done, how much is done and how much there is.
 

@@ -52,9 +52,7 @@ def test_a_corner_that_a_mesh_does_not_see_is_told_of(slave: str) -> None:
     body = together({"upper": (named(mesh, "upper"), LAW), "lower": (lower, LAW)})
     held = prescribe(body.mesh, "lower.z-", x=0.0, y=0.0, z=0.0) + prescribe(body.mesh, top, x=0.0, y=0.0, z=-0.001)
     sides = (mesh.boundary(), "lower.z+")
-    with pytest.warns(
-        ContactWarning, match=r"contact 'corner': a corner or an edge lies 0\.99 mm inside the other side"
-    ):
+    with pytest.warns(ContactWarning, match=r"'corner': a corner or an edge lies 0\.99 mm inside the other side"):
         press(body, held, [Pair(*(sides if slave == "upper" else sides[::-1]), name="corner")])
 
 
