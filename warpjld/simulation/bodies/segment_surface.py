@@ -1,7 +1,7 @@
 """Skin of selected segments of a body, so that only their flesh is meshed (R105, R126).
 
-A whole body meshed with elements of 1 cm has about a hundred thousand, two segments of an arm a few thousand. The skin is
-cut a margin beyond the segments; the mesh ends at this cut, and is held by the bones there.
+A whole body meshed with elements of 1 cm has about a hundred thousand, two segments of an arm a few thousand. The skin
+is cut a margin beyond the segments; the mesh ends at this cut, and is held by the bones there.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ class VisiblePressure:
     """Contact pressure on a visible surface at a frame.
 
     Attributes:
-        vertices: Vertices of the surface, refined where it is in contact at any frame [m], shape (V, 3); the original ones
-            come first.
+        vertices: Vertices of the surface, refined where it is in contact at any frame [m], shape (V, 3); the original
+            ones come first.
         triangles: Triangles of the refined surface, shape (T, 3).
         pressure: Pressure at the vertices [Pa], shape (V,); its integral over the surface is the normal contact force.
     """

@@ -31,7 +31,7 @@ _SAMPLES = 4
 def unresolved(
     rest: Array, interfaces: Sequence[Interface], passing: Passing, instant: ContactInstant, allowed: float
 ) -> list[str]:
-    """Warnings about penetration that the contact of an instant does not resolve: of the deepest node, and of every obstacle.
+    """Warnings about penetration that an instant's contact does not resolve: of the deepest node, and of obstacles.
 
     Args:
         rest: Positions of the bodies' nodes [m], shape (N, 3).
