@@ -43,7 +43,8 @@ class Beneath:
 
     ``least``: distance of the nearest face [m], negative if no face is in reach or the point is not behind it;
     ``depth`` below the surface [m]; outward ``normal``; ``sure``, the length of the mean normal, a measure of
-    confidence; ``thick``, thickness of the flesh [m]; ``plain``, see :func:`smooth_skin`; ``border``, 0 at the mesh's boundary.
+    confidence; ``thick``, thickness of the flesh [m]; ``plain``, see :func:`smooth_skin`; ``border``, 0 at the mesh's
+    boundary.
     """
 
     least: float

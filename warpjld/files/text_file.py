@@ -40,7 +40,7 @@ def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "stric
 
 
 def text_lines(path: str | Path) -> Iterator[str]:
-    """Lines of a text as ``read_text`` has it, read as they are asked for; what is no such text is replaced.
+    """Iterate over the lines of a text file, decoded as by ``read_text``; invalid bytes are replaced.
 
     Raises:
         InputError: It cannot be read.

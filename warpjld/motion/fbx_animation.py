@@ -85,11 +85,11 @@ def _turn_flat_ones(
     """Replace singular transforms by the joint's previous rotation with a tiny scale, in place.
 
     Args:
-        worlds: Transforms of some frames, shape (f, N, 4, 4).
+        worlds: Transforms of a block of frames, shape (f, N, 4, 4).
         tree: The joints.
-        first: Number of the first of these frames.
-        before: Transforms of the frame before, shape (N, 4, 4).
-        told: Warnings by joint are added.
+        first: Number of the block's first frame.
+        before: Transforms of the frame before the block, shape (N, 4, 4).
+        told: Warnings by joint, to which new ones are added.
     """
     linear = worlds[..., :3, :3]
     flat = np.abs(np.linalg.det(linear)) <= _FLAT * np.abs(linear).max(axis=(-1, -2)) ** 3

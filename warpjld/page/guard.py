@@ -28,7 +28,7 @@ class RequestGuard:
     Attributes:
         host: The address that the server listens on.
         token: Token that pages must send, in the address or as the cookie they then get; None: no token needed.
-        framed: Whether pages of this machine, such as notebooks, may show it in a frame.
+        framed: Whether pages of this machine, such as notebooks, may embed it in a frame.
     """
 
     host: str
@@ -58,7 +58,7 @@ class RequestGuard:
 
     @property
     def ancestors(self) -> str:
-        """Pages that may show it inside them, as browsers are told."""
+        """Value of the CSP directive ``frame-ancestors``: pages that may embed the server's pages."""
         return "frame-ancestors 'self'" + (" http://localhost:* http://127.0.0.1:*" if self.framed else "")
 
     def _is_mine(self, host: str) -> bool:

@@ -20,7 +20,7 @@ _MARK = "#228be6"
 
 
 class SelectedPanel:
-    """Selection of a joint: a click on the skin selects the joint that moves it, and puts the handle on the fingertip."""
+    """Selection of a joint: a click on the skin selects the joint that moves it and puts the handle on its tip."""
 
     def __init__(self, room: Room) -> None:
         self._room = room

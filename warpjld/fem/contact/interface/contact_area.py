@@ -32,7 +32,7 @@ _ROUNDS = 40
 _POINT = 1e-3
 """Contact area of a pressed node, relative to its tributary area, below which it is taken as that of a cone's tip."""
 _STEEPEST = 0.95
-"""Largest rise of such a flank over its length."""
+"""Largest slope (rise over length) of such a flank."""
 
 
 def contact_modulus(body: Body, interface: Interface) -> Array:
@@ -156,7 +156,7 @@ class ContactArea:
         return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
 
     def _tips(self, whole: Array, pressure: Array, modulus: Array, slope: Array) -> Array:
-        """Area of what presses as a cone or a wedge, and shows none between nodes [m²], shape (n,); 0 elsewhere."""
+        """Area of contact as of a cone or wedge, where interpolation gives hardly any [m²], shape (n,); else 0."""
         near, area = self._near, self._area
         tip = (pressure > 0.0) & (whole < _POINT * area) & (slope[near] > 0.0)
         mean = 0.5 * modulus[near] * np.where(tip, slope[near], 1.0)
@@ -172,7 +172,7 @@ class ContactArea:
 
 
 def _slopes(nodes: Ints32, rise: Array, count: int) -> Array:
-    """Mean slope of edges from nodes, by their rise over their length, where something is opposite, shape (count,)."""
+    """Mean slope (rise over length) of the edges from each node, where it faces the other side, shape (count,)."""
     seen = np.isfinite(rise)
     sine = np.clip(rise[seen], 0.0, _STEEPEST)
     total = np.bincount(nodes[seen], sine / np.sqrt(1.0 - sine**2), count)
