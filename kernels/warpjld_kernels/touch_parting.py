@@ -18,9 +18,9 @@ HOLDS = wp.constant(4.0)  # factor of a pair's separated share in the weight of 
 class Assigned:
     """The samples that act on the vertices of every part.
 
-    Those of part k have the indices ``first[k]`` to ``last[k]``: the ``sample``, and in ``ball`` its point and the square
-    of its radius [m, m²], shape (4, places), with spare places at the end. ``lower`` and ``upper`` are the corners of
-    the box that contains the radii of a part's samples.
+    Those of part k have the indices ``first[k]`` to ``last[k]`` in ``sample``, which holds indices of samples, and in
+    ``ball``, which holds their points and squared radii [m, m²], shape (4, capacity), with padding at the end. ``lower``
+    and ``upper`` are the corners of the bounding box of the balls of a part's samples.
     """
 
     first: wp.array(dtype=wp.int32)

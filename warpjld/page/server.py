@@ -98,7 +98,7 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 
 def _light(server: Any) -> None:
-    """Add ambient light and two lamps without shadows, one behind the viewer's shoulder and one for the palm.
+    """Add ambient light and two lamps without shadows: one from above, and one from below that lights the palm.
 
     Each further lamp lowers the frame rate of a browser without a graphics card by a tenth.
     """

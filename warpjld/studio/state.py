@@ -41,10 +41,11 @@ class StudioState:
         broken: Whether the script as it stands cannot be run.
         messages: What commands said last.
         coloring: What skin is coloured by.
-        joint: The joint that is selected, of the actor that sliders move.
+        joint: Selected joint of the actor that sliders move; None without a selection.
         solved: The contact that was solved last.
-        preview: A scene that is shown in place of the script's, as long as the script stays as it is.
-        defer: Has a text that searches for grasps run beside, and then what shall follow; None where this one waits.
+        preview: Script text and a scene that is shown instead of its own, until the script changes; None without one.
+        defer: Function that runs a text with grasp searches in the background and then calls a continuation; None: such
+            texts are run at once.
     """
 
     def __init__(
@@ -108,7 +109,7 @@ class StudioState:
         return sorted({*found, *(key for prop in scene.props.values() for key in prop.key_frames)})
 
     def neighbours(self) -> dict[str, float]:
-        """The keys ``before`` and ``after`` the frame that is shown, where there are any."""
+        """Frames of the nearest keys ``before`` and ``after`` the current frame, where they exist."""
         before = [key for key in self.keys if key < self.frame][-1:]
         after = [key for key in self.keys if key > self.frame][:1]
         return {which: keys[0] for which, keys in (("before", before), ("after", after)) if keys}
@@ -147,7 +148,7 @@ class StudioState:
         return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.surfaces)
 
     def contacts(self) -> NDArray[np.float32]:
-        """Points where something presses at the frame that is shown [m], shape (n, 3); none where none is solved."""
+        """Contact points at the current frame [m], shape (n, 3); empty if its contact is not solved."""
         solved = self.pressed
         if solved is None:
             return np.zeros((0, 3), np.float32)

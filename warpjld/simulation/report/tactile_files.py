@@ -13,19 +13,19 @@ __all__ = ["TACTILE_COLUMNS", "draw_tactile", "tactile_rows", "write_tactile"]
 
 TACTILE_COLUMNS = (
     Column("time", "number", "", "Time of the equilibrium: frame number where frames drive the hand."),
-    Column("pad", "text", "", "Segment the skin belongs to: digit and phalanx, or palm and the digit below it."),
-    Column("touching", "truth", "", "Whether anything presses the pad."),
-    Column("force_x", "number", "N", "Force on the pad, friction included, world frame."),
-    Column("force_y", "number", "N", "The same along y."),
-    Column("force_z", "number", "N", "The same along z."),
-    Column("normal_force", "number", "N", "Part of it that presses the skin in: pressure summed over the area."),
-    Column("centre_x", "number", "m", "Centre of pressure, world frame; missing where nothing presses."),
-    Column("centre_y", "number", "m", "The same along y."),
-    Column("centre_z", "number", "m", "The same along z."),
-    Column("area", "number", "m²", "Area under pressure, inside a border that runs between nodes."),
-    Column("peak_pressure", "number", "Pa", "Highest pressure: what presses on a node over the skin around it."),
-    Column("slip", "number", "m", "Way along the other side since the instant before, mean over the area."),
-    Column("sticking", "number", "", "Share of the area that friction holds; missing where nothing presses."),
+    Column("pad", "text", "", "Skin segment: digit and phalanx, or palm and the digit next to this part of it."),
+    Column("touching", "truth", "", "Whether the pad is in contact."),
+    Column("force_x", "number", "N", "Contact force on the pad, including friction; world frame, x component."),
+    Column("force_y", "number", "N", "Contact force, y component."),
+    Column("force_z", "number", "N", "Contact force, z component."),
+    Column("normal_force", "number", "N", "Normal contact force: pressure integrated over the contact area."),
+    Column("centre_x", "number", "m", "Centre of pressure, world frame, x coordinate; empty without contact."),
+    Column("centre_y", "number", "m", "Centre of pressure, y coordinate."),
+    Column("centre_z", "number", "m", "Centre of pressure, z coordinate."),
+    Column("area", "number", "m²", "Contact area; its border is interpolated between nodes."),
+    Column("peak_pressure", "number", "Pa", "Highest pressure: normal force on a node over its tributary area."),
+    Column("slip", "number", "m", "Slip distance since the previous time, averaged over the contact area."),
+    Column("sticking", "number", "", "Share of the contact area that sticks; empty without contact."),
 )
 """One row for each time and pad."""
 

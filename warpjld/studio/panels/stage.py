@@ -41,7 +41,7 @@ class StagePanel:
 
     @property
     def drawn(self) -> list[Shown]:
-        """What is seen."""
+        """Surfaces that are currently drawn."""
         return [*self._drawn.values()]
 
     def refresh(self) -> None:

@@ -191,7 +191,7 @@ class NewtonState:
         return self._quiet or (self.system.settled(self.contact, self.states, self._negligible) and self._lawful())
 
     def _lawful(self) -> bool:
-        """Whether friction opposes the slip; the direction of slip may have changed since the multipliers were updated."""
+        """Whether friction opposes slip, whose direction may have changed since the multipliers were updated."""
         if not any(t.friction.any() for t in self.contact.tractions):
             return True
         found = self.forces(self.contact.points, self.u, ActiveSet.TRIAL, coupled=self.contact.coupled)
