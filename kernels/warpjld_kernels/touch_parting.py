@@ -19,8 +19,8 @@ class Assigned:
     """The samples that act on the vertices of every part.
 
     Those of part k have the indices ``first[k]`` to ``last[k]`` in ``sample``, which holds indices of samples, and in
-    ``ball``, which holds their points and squared radii [m, m²], shape (4, capacity), with padding at the end. ``lower``
-    and ``upper`` are the corners of the bounding box of the balls of a part's samples.
+    ``ball``, which holds their points and squared radii [m, m²], shape (4, capacity), with padding at the end.
+    ``lower`` and ``upper`` are the corners of the bounding box of the balls of a part's samples.
     """
 
     first: wp.array(dtype=wp.int32)

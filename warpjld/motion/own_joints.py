@@ -177,7 +177,7 @@ class _Widened:
         if rig.skin is not None:
             self._fleshy[:] = False
             self._fleshy[rig.skin.joints[rig.skin.weights > 0.01]] = True
-        self._off = np.zeros(count)  # largest change of scale, its frame, and the scale there
+        self._off = np.zeros(count)  # largest change of scale; its frame and scale follow
         self._at, self._factor = np.zeros(count, dtype=np.int64), np.ones(count)
         self._largest = np.zeros(count)
         self._as_parent = np.ones(count, dtype=bool)

@@ -153,7 +153,7 @@ class Performance:
         return self._parsed
 
     def _go_back(self, number: int, spoilt: bool = False) -> None:
-        """Restore the scene before the statement with this number; ``spoilt``: even if no statement after it is done."""
+        """Restore the scene before the statement with this number; ``spoilt``: even if that is the current state."""
         if number == len(self._done) and not spoilt:
             return
         while self._kept[-1].number > number:

@@ -92,7 +92,7 @@ class Room:
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.set_panel_label("warpjld studio")
         gui.main_panel.dock_right()
-        self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs: seen wherever one is
+        self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs, so always visible
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
             self.stage, ghosts, pose = StagePanel(self), GhostsPanel(self), PoseToolsPanel(self)
@@ -114,7 +114,7 @@ class Room:
         self.panels = [*posing, script, files, work, menus, timeline, curves, self.progress, messages]
 
     def _beside(self, text: str, then: Callable[[], object]) -> None:
-        """Run a text that searches for grasps in the background, and then go on."""
+        """Run a text with grasp searches in the background, and then call ``then``."""
         state = self.state
         performance, path = state.performance.beside(), state.document.path
 
@@ -133,7 +133,7 @@ class Room:
         self.progress.start("the search", work, told, failed)
 
     def _failed(self, error: BaseException) -> None:
-        """Show what a job raised: nothing is swallowed, and nothing ends the studio."""
+        """Show the exception of a job; the studio keeps running."""
         if isinstance(error, WarpjldError):
             self.state.error = error
         else:

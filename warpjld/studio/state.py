@@ -178,13 +178,16 @@ class StudioState:
         self._run()
 
     def do(self, lines: str, kind: Hashable = None) -> bool:
-        """Add lines to the script; False where they cannot be done, and then it is as it was."""
+        """Append lines to the script and run it; returns False, with the script unchanged, if they fail."""
         body = self.document.text.rstrip("\n")
         return self.put(f"{body}\n{lines}\n" if body else f"{lines}\n", kind)
 
     def put(self, text: str, kind: Hashable = None) -> bool:
-        """Make this the script if it can be run; False where it cannot, and then it is as it was. What searches for
-        grasps is deferred, and becomes the script when it is done, if nothing else was done meanwhile."""
+        """Replace the script by a text and run it; returns False, with the script unchanged, if it fails.
+
+        A text with grasp searches is run in the background; it replaces the script at the end of the search, unless the
+        script was changed meanwhile.
+        """
         if self.broken:
             assert self.error is not None
             self.messages.append("nothing can be done by mouse before the script's fault is mended")
@@ -204,7 +207,7 @@ class StudioState:
         return True
 
     def set_angles(self, angles: Mapping[str, float], kind: Hashable = None) -> bool:
-        """Set keys [degrees] of some channels at the frame that is shown; they are held at their limits."""
+        """Set keys of channels at the current frame [degrees], clamped to their limits."""
         limits, actor = self.channels(), self.actor
         if actor is None:
             return False
@@ -213,25 +216,25 @@ class StudioState:
         return self.put(with_keys(self.document.text, held, self.frame, actor=other), kind)
 
     def key_all(self) -> bool:
-        """Set keys of all channels at the frame that is shown, where they are."""
+        """Set keys of all channels at the current frame to their current values."""
         return self.set_angles(self.angles())
 
     def undo(self) -> bool:
-        """Take back what was done last; False where there is nothing to."""
+        """Undo the last change; returns False if there is none."""
         done = self.document.undo()
         if done:
             self._run()
         return done
 
     def redo(self) -> bool:
-        """Do again what was taken back last; False where there is nothing to."""
+        """Redo the change that was undone last; returns False if there is none."""
         done = self.document.redo()
         if done:
             self._run()
         return done
 
     def open(self, document: ScriptDocument, within: Sequence[Path] | None = None) -> None:
-        """Another script; files may be read from other folders than before where they are given."""
+        """Open another script; ``within`` replaces the folders that files may be read from, if given."""
         if within is not None:
             self.performance = Performance(self.folder, say=self.messages.append, within=within)
         self.document = document
@@ -239,7 +242,7 @@ class StudioState:
         self._run()
 
     def fail(self, error: WarpjldError, text: str) -> None:
-        """What was deferred cannot be run: the script is broken if this is its text, and else as it was."""
+        """Report that a deferred text failed; the script is marked as broken if this is its text."""
         self.error, self.broken = error, text == self.document.text
 
     def _put_later(self, before: str, text: str, kind: Hashable) -> None:
@@ -249,7 +252,7 @@ class StudioState:
             self.messages.append("a search ended, but the script was changed meanwhile: what it found is not used")
 
     def _deferred(self, text: str, then: Callable[[], object]) -> bool:
-        """Whether this text is run beside first."""
+        """Start running a text in the background if it has grasp searches; returns whether it did."""
         if self.defer is None or not self.performance.searches(text, self.document.path):
             return False
         self.defer(text, then)

@@ -17,9 +17,9 @@ _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": 
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
 """Segment that ends at a thumb's joint."""
 _FOLDING = ("elbow", "knee")
-"""Joints that fold so far that flesh on both sides comes into contact."""
+"""Joints at which flesh on both sides comes into contact when they are flexed."""
 _CREASED = 0.4
-"""Width of the transition at a crease, relative to that beside a phalanx: a crease is a line."""
+"""Width of the transition at a crease, relative to that next to an excluded phalanx."""
 _BETWEEN = "middle"
 """Phalanx between a finger's first and last; a thumb has none."""
 WEB = ".web"

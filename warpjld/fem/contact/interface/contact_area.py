@@ -12,9 +12,9 @@ The border of the stick area is found alike: the reserve of friction, μ p − |
 Mindlin; Johnson 1985, §7.2). As slip depends on the load history, the scale is taken from the next node inwards: the
 ratio of the two reserves is φ(f) / φ(f + 1).
 
-A corner, or an edge, is in contact over less area than its faces have. For a cone or wedge whose flanks stand off by an
-angle β the mean pressure is E* tan β / 2, independent of the force (Sneddon 1948; Johnson 1985, §5.2): force over that
-pressure is the area.
+A corner or an edge is in contact over a smaller area than that of its faces. For a cone or wedge whose flanks make an
+angle β with the other surface, the mean pressure is E* tan β / 2, independent of the force (Sneddon 1948; Johnson 1985,
+§5.2); the area is the force over this pressure.
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ _TURNING = 1
 """Iterations after which normals without known derivatives are frozen; weights are updated until gaps no longer change.
 Both are verified at convergence (``confirmed``)."""
 _STALE = 0.025
-"""Movement of a node since the last search for contact points, over the search distance, from which on points are
-searched again: along a curved surface gaps change with its square."""
+"""Motion of a node since the last search for contact points, relative to the search distance, beyond which points are
+searched again: on a curved surface, the error of the gap grows with its square."""
 _FIXED_POINT = 8
 """Iterations of the fixed-point phase."""
 _SAME = 2
