@@ -67,7 +67,7 @@ class Performance:
 
     @property
     def scene(self) -> Scene:
-        """What the statements that ran describe."""
+        """Scene after the statements that have run."""
         return self._interpreter.scene
 
     @property

@@ -41,7 +41,7 @@ class Room:
     """A studio that windows connect to; all of them show and change the same state.
 
     Args:
-        state: What is shown and changed.
+        state: State shown and edited by the panels.
         host: Address to listen on. Any but this machine's own asks windows for a token.
         port: Port to listen on, or the next that is free; 0 for any.
 

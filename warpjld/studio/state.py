@@ -37,7 +37,7 @@ class StudioState:
     Attributes:
         document: The script.
         frame: The frame that is shown.
-        error: What is wrong with the script or with the last command; None where nothing is.
+        error: Error of the script or of the last command; None without one.
         broken: Whether the script as it stands cannot be run.
         messages: What commands said last.
         coloring: What skin is coloured by.
@@ -76,7 +76,7 @@ class StudioState:
 
     @property
     def scene(self) -> Scene:
-        """What the script describes; where it is broken, what its lines before the fault do."""
+        """Scene described by the script; if the script is broken, that of the lines before the error."""
         return self.performance.scene
 
     @property
