@@ -34,9 +34,9 @@ def check_runs(runs: Runs, skeleton: Skeleton, anchors: Anchors, vertices: int) 
     first, length, coefficient, slot, *kinds = runs.runs.astype(np.int64).T
     counts = np.stack(kinds, axis=1)
     if (runs.runs < 0).any() or (length < _LANES).any() or (np.cumsum(length) - length != first).any():
-        raise ValueError("its runs do not follow one another")
+        raise ValueError("runs are not contiguous")
     if int(length.sum()) != len(runs.order) or len(np.unique(runs.order)) != vertices:
-        raise ValueError("its runs do not hold every vertex")
+        raise ValueError("runs do not contain every vertex once")
     if ((coefficient + length * (counts @ [1, 1, 1, 3] + 3)) > len(runs.coefficients)).any():
         raise ValueError("a run reads beyond its coefficients")
     if ((slot + counts.sum(axis=1)) > len(runs.slots)).any():
@@ -54,7 +54,7 @@ def _check_slots(slots: NDArray[np.int32], counts: list[int], columns: Columns) 
     for count, first, end, width in zip(counts, columns.kinds[:-1], columns.kinds[1:], (3, 4, 1, 1), strict=True):
         of_kind = slots[begin : begin + count]
         if len(of_kind) and not first <= of_kind.min() <= of_kind.max() <= end - width:
-            raise ValueError("a slot is none of the palette's columns of its kind")
+            raise ValueError("a slot is not a palette column of its kind")
         begin += count
 
 
@@ -78,7 +78,7 @@ def check_anchors(anchors: Anchors, skeleton: Skeleton) -> None:
     check_array("between", anchors.between, (count, 2), np.float64)
     check_array("station", anchors.station, (count, 2), np.float64)
     if anchors.station.size and not 0.0 <= anchors.station.min() <= anchors.station.max() <= STATIONS - 1:
-        raise ValueError("station: beyond its pair")
+        raise ValueError(f"station: want values from 0 to {STATIONS - 1}")
     check_array("rigid", anchors.rigid, (count,), np.int32, within=(-1, len(skeleton)))
 
 
@@ -95,11 +95,11 @@ def check_sparse(name: str, parts: Mapping[str, NDArray[Any]], shape: tuple[int,
     check_array(f"{name}.data", parts["data"], (None,), np.float64)
     for part, want, within in (("indices", entries, (0, shape[1])), ("indptr", (shape[0] + 1,), (0, entries[0] + 1))):
         if parts[part].dtype not in (np.int32, np.int64):
-            raise ValueError(f"{name}.{part}: no indices")
+            raise ValueError(f"{name}.{part}: want int32 or int64, got {parts[part].dtype}")
         check_array(f"{name}.{part}", parts[part], want, parts[part].dtype, within=within)
     rows = parts["indptr"]
     if rows[0] != 0 or rows[-1] != entries[0] or (np.diff(rows) < 0).any():
-        raise ValueError(f"{name}: its rows do not follow one another")
+        raise ValueError(f"{name}: row pointers are not ascending from 0 to the number of entries")
 
 
 def check_array(

@@ -39,11 +39,11 @@ class RequestGuard:
         """Reason to refuse a request for this path with these headers; None to accept it."""
         host = headers.get("Host", "")
         if not self._is_mine(host):
-            return "this server is not called so"
+            return "the host name in the request is not that of this server"
         origin = headers.get("Origin")
         upgrades = headers.get("Upgrade", "").lower() == "websocket"
         if upgrades and origin is None:
-            return "a connection says which page it is from"
+            return "a WebSocket connection needs an Origin header"
         if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
             return "only the studio's own page may connect"
         if self.token is not None and not self._knows(path, headers):

@@ -61,7 +61,7 @@ class SurfaceView:
         self, frames: Sequence[Sequence[ViewedSurface]], *, numbers: Sequence[float] | None = None, rate: float = 25.0
     ) -> None:
         if not frames or not frames[0]:
-            raise InputError("a view wants at least one frame with a surface")
+            raise InputError("a view needs at least one frame with a surface")
         self._frames, self._rate = frames, rate
         self._numbers = [float(k) for k in range(len(frames))] if numbers is None else [*map(float, numbers)]
         self._meshes: dict[str, Any] = {}

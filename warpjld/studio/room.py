@@ -38,7 +38,7 @@ LOCAL = "127.0.0.1"
 
 
 class Room:
-    """A studio that windows connect to; all of them show and change the same state.
+    """A studio that browser windows connect to; all of them show and edit the same state.
 
     Args:
         state: State shown and edited by the panels.
@@ -65,16 +65,16 @@ class Room:
         self.post(lambda: None)
 
     def post(self, job: Callable[[], object], key: Hashable = None) -> None:
-        """Have something done to the state, and the panels refreshed."""
+        """Queue a job that may change the state; panels are refreshed afterwards."""
         self.worker.post(job, key)
 
     def by_hand(self, event: Any, job: Callable[[], object], key: Hashable = None) -> None:
-        """As ``post``, unless a control changed because a panel refreshed it."""
+        """``post`` a job for a control's event, unless it was caused by a panel's refresh."""
         if event.client_id is not None:
             self.post(job, key)
 
     def refresh(self) -> None:
-        """Show the state as it is."""
+        """Refresh all panels, and save the script's recovery file if it has changed."""
         for panel in self.panels:
             panel.refresh()
         if self.state.document.text != self._kept:
@@ -82,7 +82,7 @@ class Room:
             self._autosave()
 
     def stop(self) -> None:
-        """Keep what is not saved, and close."""
+        """Save unsaved changes to the recovery file, and stop the server."""
         self.worker.stop()
         self._autosave()
         stop(self.server)

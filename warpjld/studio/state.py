@@ -72,7 +72,7 @@ class StudioState:
         self._actor: str | None = None
         self._run()
 
-    # ---- what there is -------------------------------------------------------------------------------------------
+    # ---- state shown --------------------------------------------------------------------------------------------
 
     @property
     def scene(self) -> Scene:
@@ -103,7 +103,7 @@ class StudioState:
 
     @property
     def keys(self) -> list[float]:
-        """Frames that hold keys, of all actors and objects."""
+        """Frames with keys of any actor or object, ascending."""
         scene = self.scene
         found = [key for actor in scene.actors.values() for key in actor.key_frames]
         return sorted({*found, *(key for prop in scene.props.values() for key in prop.key_frames)})
@@ -115,7 +115,7 @@ class StudioState:
         return {which: keys[0] for which, keys in (("before", before), ("after", after)) if keys}
 
     def channels(self) -> dict[str, tuple[float, float]]:
-        """Channels of the actor that may move, with their limits in degrees."""
+        """Movable channels of the actor, with their limits [degrees]."""
         actor = self.actor
         if actor is None or actor.recorded is not None:
             return {}
@@ -128,7 +128,7 @@ class StudioState:
         }
 
     def angles(self, frame: float | None = None) -> dict[str, float]:
-        """Degrees of every channel that may move at a frame, the one that is shown at first, held at their limits."""
+        """Values of the movable channels at a frame, by default the current one, clamped to their limits [degrees]."""
         actor = self.actor
         at = self.frame if frame is None else frame
         if actor is None:
@@ -139,7 +139,7 @@ class StudioState:
         }
 
     def shown(self) -> list[Shown]:
-        """The surfaces at the frame that is shown; as contact has them, as long as it is that of this script."""
+        """Surfaces at the current frame, of the preview, the contact solution of this script, or else the scene."""
         if self.preview is not None and self.preview[0] == self.document.text:
             return self.surfaces.at(self.preview[1], self.frame, self.coloring)
         solved = self.pressed
@@ -156,24 +156,24 @@ class StudioState:
 
     @property
     def pressed(self) -> Pressed | None:
-        """The contact that was solved, if it is that of this script."""
+        """Solved contact, if it was solved for the current script."""
         solved = self.solved
         return solved if solved is not None and solved.text == self.document.text else None
 
     def copied_scene(self) -> Scene:
-        """A scene like this one, to be worked on beside it.
+        """Independent copy of the scene, for background jobs.
 
         Raises:
-            WarpjldError: The script cannot be run as it stands.
+            WarpjldError: The script has an error.
         """
         if self.broken and self.error is not None:
             raise self.error
         return self.performance.copied()
 
-    # ---- what is done --------------------------------------------------------------------------------------------
+    # ---- edits of the script -------------------------------------------------------------------------------------
 
     def write(self, text: str, kind: Hashable = None) -> None:
-        """The script is this text: typed, and kept with its faults."""
+        """Replace the script by a typed text, which is kept even if it has errors, and run it."""
         self.document.edit(text, kind)
         self._run()
 
@@ -190,7 +190,7 @@ class StudioState:
         """
         if self.broken:
             assert self.error is not None
-            self.messages.append("nothing can be done by mouse before the script's fault is mended")
+            self.messages.append("the script has an error: correct its text before editing it with the mouse")
             return False
         before = self.document.text
         try:
@@ -249,7 +249,7 @@ class StudioState:
         if self.document.text == before:
             self.put(text, kind)
         else:
-            self.messages.append("a search ended, but the script was changed meanwhile: what it found is not used")
+            self.messages.append("a search has ended, but the script was changed meanwhile: its result is not used")
 
     def _deferred(self, text: str, then: Callable[[], object]) -> bool:
         """Start running a text in the background if it has grasp searches; returns whether it did."""
