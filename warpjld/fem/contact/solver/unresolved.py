@@ -57,7 +57,7 @@ def unresolved(
             if depth > 0.0:
                 out.append(
                     f"{interface.pair.title}: at time {instant.time:.4g} the obstacle penetrates a face by "
-                    f'{1e3 * depth:.3g} mm between its nodes: forces are too low; use sites="faces", or smaller elements'
+                    f'{1e3 * depth:.3g} mm between its nodes: forces are too low; use sites="faces" or smaller elements'
                 )
     return out
 
