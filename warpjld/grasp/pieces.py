@@ -38,7 +38,7 @@ def cut_object(thing: GraspObject, count: int, axis: int) -> list[GraspObject]:
     if count < 2:
         raise InputError(f"pieces: want 2 or more, got {count}")
     if not thing.report.watertight:
-        raise InputError(f"{thing.name} has an open surface: there is no inside to cut")
+        raise InputError(f"{thing.name} has an open surface: only closed ones can be cut")
     low, high = float(thing.vertices[:, axis].min()), float(thing.vertices[:, axis].max())
     ends = np.linspace(low, high, count + 1)
     out = []

@@ -60,7 +60,7 @@ def fault_of(draws: Draws, friction: float) -> str:
     if doubt := doubt_of_size(thing, length, None):
         return f"the unit is at fault, it seems: the object {doubt}"
     if narrowest >= most:
-        return f"the object is at fault: nowhere has it two opposite sides that this friction holds; {sizes}"
+        return f"the object is at fault: it has no two opposite sides that this friction could hold; {sizes}"
     sizes = f"the object is {1e3 * narrowest:.0f} mm wide where it is narrowest, {sizes}"
     if narrowest > widest:
         return f"the object is at fault: it is too wide for this hand; {sizes}"

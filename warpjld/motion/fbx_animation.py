@@ -98,5 +98,6 @@ def _turn_flat_ones(
         u, _, v = np.linalg.svd(last[:3, :3])
         linear[frame, joint] = _TINY * u @ v
         told.setdefault(
-            int(joint), f"joint '{tree.names[joint]}' is scaled to nothing at frame {first + frame}: not turned then"
+            int(joint),
+            f"joint '{tree.names[joint]}' is scaled to nothing at frame {first + frame}: its last rotation is kept",
         )

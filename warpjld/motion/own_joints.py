@@ -253,6 +253,5 @@ class _Merged:
             return []
         shown = first_few([text for _, text in sorted(told, reverse=True)])
         return [
-            "the animation turns joints that are none of this skeleton, and what flesh they have does not follow: "
-            f"{shown}"
+            f"the animation rotates joints that are not part of this skeleton, and their flesh does not follow: {shown}"
         ]

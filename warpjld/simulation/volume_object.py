@@ -91,7 +91,7 @@ def _object(name: str, cells: VolumeCells, origin: str) -> GraspObject:
     """Object with the boundary of a volume mesh as its surface."""
     mesh = HexMesh(cells.nodes, cells.elements, cells.regions, cells.region_names)
     if float(mesh.scaled_jacobian().min()) <= 0.0:
-        raise InputError("elements of the volume mesh are turned inside out, or have no volume")
+        raise InputError("the volume mesh has inverted elements, or elements without volume")
     quads = mesh.quads(mesh.boundary())
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     a, b, c = triangles.T

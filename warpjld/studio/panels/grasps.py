@@ -81,7 +81,7 @@ class GraspsPanel:
                 self._show(next(iter(self._ways)), last)
 
         def done(ways: list[GraspWay]) -> None:
-            state.messages.append(f"{len(ways)} ways to take it: choose one under Objects")
+            state.messages.append(f"{len(ways)} grasps found: choose one under Objects")
 
         self._ways = {}
         self._room.progress.start("GRASP AUTO", work, done)

@@ -109,7 +109,7 @@ class WorkPanel:
         state = self._room.state
         scene, actor = state.copied_scene(), state.actor
         if actor is None:
-            raise InputError("there is nobody whose skin could be fitted")
+            raise InputError("there is no actor whose skin could be calibrated")
         name, path = actor.name, state.document.path.with_name(f"{state.document.path.stem}-{actor.name.lower()}.json")
 
         def told(losses: tuple[float, float]) -> None:
