@@ -48,16 +48,16 @@ def unresolved(
     depth, k = passing.deepest(instant.displacement.reshape(-1), instant.time, touched, slack)
     if depth > 0.0:
         out.append(
-            f"{interfaces[k].pair.title}: at time {instant.time:.4g} a corner or an edge penetrates the other side "
-            f"by {1e3 * depth:.3g} mm without contact force: forces are too low; use smaller elements"
+            f"{interfaces[k].pair.title}: a corner or an edge lies {1e3 * depth:.3g} mm inside the other side without "
+            "contact: forces are too low; use smaller elements"
         )
     for interface in interfaces:
         if isinstance(interface.pair.master, Obstacle) and interface.pair.sites == "nodes":
             depth = _between_nodes(interface, interface.pair.master, x, instant.time)
             if depth > 0.0:
                 out.append(
-                    f"{interface.pair.title}: at time {instant.time:.4g} the obstacle penetrates a face by "
-                    f'{1e3 * depth:.3g} mm between its nodes: forces are too low; use sites="faces" or smaller elements'
+                    f"{interface.pair.title}: the obstacle enters a face by {1e3 * depth:.3g} mm between its nodes: "
+                    'forces are too low; use smaller elements (in Python, or sites="faces")'
                 )
     return out
 
