@@ -86,13 +86,13 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "tim
     columns = max(1, len(groups))
     figure = Figure(figsize=(3.1 * columns + 0.8, 8.2), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title or "What the skin feels", fontsize=13)
+    figure.suptitle(title or "Tactile readings", fontsize=13)
     axes: Any = figure.subplots(4, columns, squeeze=False, sharex=True, sharey="row")
     rows = (
         ("normal force, N", tactile.normal_force, 1.0),
         ("area, mm²", tactile.area, 1e6),
-        ("slip in the step, mm", tactile.slip, 1e3),
-        ("share that sticks", tactile.sticking, 1.0),
+        ("slip since the previous time, mm", tactile.slip, 1e3),
+        ("sticking share of the area", tactile.sticking, 1.0),
     )
     for column, (group, members) in enumerate(groups.items()):
         axes[0, column].set_title(group, fontsize=11)
@@ -110,12 +110,12 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "tim
     for place in axes[3]:
         place.set_ylim(-0.05, 1.05)
     if not groups:
-        axes[0, 0].text(0.5, 0.5, "nothing touches", ha="center", transform=axes[0, 0].transAxes)
+        axes[0, 0].text(0.5, 0.5, "no contact", ha="center", transform=axes[0, 0].transAxes)
     with whole_file(path) as part:
         figure.savefig(part, metadata={"Software": None})
 
 
 def _group(pad: str) -> str:
-    """Digit of a pad, or ``palm``; for pads of no hand, the last part but one of the name, else ``palm``."""
+    """Digit of a pad, or ``palm``; for pads outside hands, the last part but one of the name, else ``palm``."""
     parts = pad.split(".")
     return "palm" if "palm" in parts or len(parts) < 2 or parts[-1] in ("wrist", "forearm") else parts[-2]
