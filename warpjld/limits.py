@@ -1,8 +1,8 @@
-"""The most of everything that is read or computed: one table, what it says is refused, and how it is raised.
+"""Limits on the sizes of inputs and computations, which can be changed by option or environment variable.
 
-Each limit is raised, or lowered, by ``warpjld --limit NAME=NUMBER …`` or the environment variable that carries its
-name: ``WARPJLD_LIMIT_VERTICES`` for ``vertices``. A refusal names both. Limits keep a damaged file, or one made for
-it, from filling the machine; they are far above what people work with.
+Each limit can be raised or lowered by ``warpjld --limit NAME=NUMBER …`` or the environment variable with its
+name: ``WARPJLD_LIMIT_VERTICES`` for ``vertices``. Error messages name both. Limits keep damaged or malicious files
+from exhausting memory; they are far above usual sizes.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ __all__ = ["LIMITS", "Limit", "check_limit", "limit", "set_limit", "variable"]
 
 @dataclass(frozen=True)
 class Limit:
-    """The most of one thing.
+    """One limit.
 
     Attributes:
-        most: The limit where nothing else is said.
-        unit: What is counted, in the plural.
-        about: Of what.
+        most: Default value.
+        unit: Counted items, in the plural.
+        about: What they belong to.
     """
 
     most: int
@@ -49,29 +49,29 @@ LIMITS = {
     "instants": Limit(100_000, "instants", "a load step"),
     "elements": Limit(2_000_000, "elements", "a finite-element mesh"),
 }
-"""By name, as ``--limit`` and, in capitals with underscores, the environment have them."""
+"""Limits by their names in ``--limit``; environment variables have them in capitals with underscores."""
 
 
 def variable(name: str) -> str:
-    """Environment variable of a limit."""
+    """Name of the environment variable of a limit."""
     return f"WARPJLD_LIMIT_{name.replace('-', '_').upper()}"
 
 
 def limit(name: str) -> int:
-    """The most of what ``name`` says, as the environment has it, or else the default.
+    """Value of a limit: that of its environment variable, or else the default.
 
     Raises:
-        InputError: The environment variable is no whole number above 0.
+        InputError: The environment variable is not an integer above 0.
     """
     stated = os.environ.get(variable(name))
     return LIMITS[name].most if stated is None else _number(stated, variable(name))
 
 
 def set_limit(name: str, value: str) -> None:
-    """Set a limit for this process and those that it starts.
+    """Set a limit for this process and its child processes.
 
     Raises:
-        InputError: There is no such limit, or the value is no whole number above 0.
+        InputError: There is no such limit, or the value is not an integer above 0.
     """
     if name not in LIMITS:
         raise InputError(f"--limit: there is no limit '{name}'{did_you_mean(name, LIMITS)}; known: {', '.join(LIMITS)}")
@@ -79,16 +79,16 @@ def set_limit(name: str, value: str) -> None:
 
 
 def check_limit(name: str, count: float, *, of: str = "", path: str | Path | None = None) -> None:
-    """Make sure that there are no more than the limit allows, before anything is allocated for them.
+    """Check a count against a limit, before memory is allocated.
 
     Args:
-        name: Of ``LIMITS``.
-        count: How many there are.
-        of: What has so many, for the message.
+        name: Name of the limit in ``LIMITS``.
+        count: The count.
+        of: Description of what is counted, for the message.
         path: The file concerned.
 
     Raises:
-        InputError: There are more.
+        InputError: The count exceeds the limit.
     """
     most = limit(name)
     if not count <= most:

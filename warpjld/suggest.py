@@ -1,4 +1,4 @@
-"""Did you mean …? for misspelt words."""
+"""Suggestions for misspelt words."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ __all__ = ["did_you_mean", "one_of"]
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """``; did you mean X?`` where a known word is close to ``word``, whatever the case; otherwise nothing."""
+    """``; did you mean X?`` if a known word is similar to ``word``, ignoring case; otherwise empty."""
     pool = {name.upper(): name for name in known}
     close = get_close_matches(word.upper(), list(pool), n=1, cutoff=0.6)
     return f"; did you mean {pool[close[0]]}?" if close else ""
 
 
 def one_of(word: str, known: Iterable[str]) -> str:
-    """The same, and where none is close ``; want one of X, Y, …``: for short lists."""
+    """As ``did_you_mean``, but ``; want one of X, Y, …`` if no known word is similar; for short lists."""
     names = list(known)
     return did_you_mean(word, names) or f"; want one of {', '.join(names)}"

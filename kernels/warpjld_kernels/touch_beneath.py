@@ -1,7 +1,7 @@
-"""How deep points lie beneath the meshes of parts, by trees of boxes with eight children a node.
+"""Penetration depth of points below the meshes of parts, by bounding volume hierarchies with eight children per node.
 
-Eight boxes, or the eight triangles of a leaf, are measured at once; the trees have the shape of
-``warpjld.grasp.triangle_tree``, one a part, and every frame fits their boxes anew.
+The eight boxes of a node, or the eight triangles of a leaf, are tested at once (SIMD). The trees have the layout of
+``warpjld.grasp.triangle_tree``, one per part; their boxes are refitted in every frame.
 """
 
 import warp as wp
@@ -18,11 +18,12 @@ NEARLY = wp.constant(0.5)  # faces up to this share farther than the nearest con
 class PartTrees:
     """The triangles of P parts.
 
-    ``tree`` has one surface a part; the nodes of part k are ``first_node[k]`` to ``first_node[k + 1]``, ``held`` their
-    numbers of children. By leaf, for its eight triangles side by side: ``corner``, the three vertices of each; the
-    ``units`` normals of these in the order of the tree's corners; their ``border``, 0 on the mesh's boundary, else 1,
-    and ``thickness`` [m]; the least :func:`smooth_skin` of them, ``plain``; and ``real``, 0 for the triangles that fill
-    up a part's last leaf, else 1.
+    ``tree`` has one surface per part; the nodes of part k are ``first_node[k]`` to ``first_node[k + 1]`` (exclusive),
+    and ``held`` is the count of children of each node. The other arrays hold, for each leaf, the values of its eight
+    triangles: ``corner``, vertex indices of the three corners; ``units``, unit normals of the corners, in the layout of
+    the tree's corners; ``border``, 0 for corners on the mesh's boundary, else 1; ``thickness`` of the flesh at the
+    corners [m]; ``plain``, the least :func:`smooth_skin` of the corners; ``real``, 0 for padding triangles in a part's
+    last leaf, else 1.
     """
 
     tree: Tree
@@ -38,11 +39,12 @@ class PartTrees:
 
 @wp.struct
 class Beneath:
-    """Position of a point relative to the mesh of a part, averaged over near faces.
+    """Position of a point relative to the mesh of a part, as weighted means over near faces.
 
-    ``least`` is the distance of the nearest face [m], negative where none is in reach with the point behind it;
-    ``depth`` below the surface [m], outward ``normal``, its confidence ``sure`` (length of the mean normal), thickness
-    of the flesh ``thick`` [m], :func:`smooth_skin` in ``plain``, and ``border``, 0 at the mesh's boundary.
+    ``least``: distance of the nearest face [m], negative if no face is in reach or the point is not behind it;
+    ``depth`` below the surface [m]; outward ``normal``; ``sure``, the length of the mean normal, a measure of
+    confidence; ``thick``, thickness of the flesh [m]; ``plain``, see :func:`smooth_skin`; ``border``, 0 at the mesh's
+    boundary.
     """
 
     least: float
@@ -103,7 +105,7 @@ def fit_tree(
     units: wp.array(dtype=wp.vec3),
     plains: wp.array(dtype=float),
 ):
-    """Bring positions and normals of a part's corners into its leaves, and fit its boxes to them."""
+    """Copy positions and normals of a part's corners into its leaves, and refit its boxes."""
 
 
 @wp.kernel
@@ -115,7 +117,7 @@ def fit_trees(
     # in and out
     trees: PartTrees,
 ):
-    """Fit the trees of the parts that are wanted."""
+    """Refit the trees of the parts whose ``wanted`` is not 0."""
     k = wp.tid()
     if wanted[k] != 0:
         fit_tree(trees, k, points, units, plains)
@@ -123,8 +125,8 @@ def fit_trees(
 
 _Found = wp.types.vector(length=8, dtype=float)
 
-# squared distances of eight triangles from a point, their corners relative to it, and weights of these at the nearest
-# point of each
+# nearest_of: squared distances of a leaf's triangles from a point, corners relative to it, and barycentric coordinates
+# of the nearest points; away_from: squared distances of the boxes of a node's children
 _NEAREST = f"""
     const int W = {WIDTH};
     auto nearest_of = [&](const float* leaf, Floats corner[3][3], Floats weight[3]) {{
@@ -163,7 +165,7 @@ _NEAREST = f"""
         const Floats wide = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
         const Floats height = corner[0][0] * normal[0] + corner[0][1] * normal[1] + corner[0][2] * normal[2];
         const Floats inverse = Floats(1.0f) / HIGHEST(wide, Floats(1e-37f));
-        // a triangle without area has no inside, only a normal made of rounding
+        // a degenerate triangle has no interior: its normal is rounding error
         lateral = wide > 1e-12f * lengths * lengths ? lateral : Floats(-1.0f);
         const auto above = lateral >= Floats(0.0f);
         squared = above ? LOWEST(squared, height * height * inverse) : squared;
@@ -196,7 +198,7 @@ _NEAREST = f"""
     + f"""
     wp::vec_t<8, float> out;
     out[0] = -1.0f;
-    // first the nearest triangle; a word of the stack is a squared distance, in the order of its bits, and a node
+    // first pass: nearest triangle. Stack entries hold a squared distance (float bits, high word) and a node (low word)
     wp::uint64 stack[{WAITING}];
     int count = 1;
     stack[0] = (wp::uint32)trees.tree.root.data[part];
@@ -322,14 +324,14 @@ def mean_of_near_faces(
 
 @wp.func
 def beneath(trees: PartTrees, part: int, point: wp.vec3, reach: float, narrowest: float) -> Beneath:
-    """Weighted means over the faces of a part that are about as near to a point as the nearest.
+    """Weighted means over the faces of a part whose distance from a point is close to that of the nearest face.
 
     The closest face alone would make the outward direction discontinuous where another face becomes the closest. In the
     middle of the flesh the directions cancel: the length of their mean is a measure of confidence.
 
     Args:
-        reach: Distance within which the nearest face must be [m].
-        narrowest: Least distance over which the weights of farther faces fade [m].
+        reach: Largest distance of the nearest face [m].
+        narrowest: Least width of the distance interval over which weights fall to 0 [m].
     """
     found = mean_of_near_faces(trees, part, point, reach, NEARLY, narrowest)
     out = Beneath()

@@ -18,9 +18,9 @@ HOLDS = wp.constant(4.0)  # factor of a pair's separated share in the weight of 
 class Assigned:
     """The samples that act on the vertices of every part.
 
-    Those of part k are in places ``first[k]`` to ``last[k]``: the ``sample``, and in ``ball`` its point and the square
-    of its radius [m, m²], shape (4, places), with spare places at the end. ``lower`` and ``upper`` are the corners of
-    the box that contains the radii of a part's samples.
+    Those of part k have the indices ``first[k]`` to ``last[k]`` in ``sample``, which holds indices of samples, and in
+    ``ball``, which holds their points and squared radii [m, m²], shape (4, capacity), with padding at the end.
+    ``lower`` and ``upper`` are the corners of the bounding box of the balls of a part's samples.
     """
 
     first: wp.array(dtype=wp.int32)
@@ -85,7 +85,7 @@ def choose_pair_weights(
 
 @wp.func
 def acts_on(parts: Parts, own: int, other: int, side: int, k: int) -> int:
-    """The k-th part beside one of the two of a sample, -1 for none; a part beside both counts once."""
+    """The k-th part that is a neighbour of either part of a sample, -1 for none; a neighbour of both counts once."""
     a = parts.beside[wp.where(side == 0, own, other), k]
     if a >= 0 and side == 1 and parts.apart[own, a] == 2:
         a = -1
@@ -109,7 +109,7 @@ def assign_samples(
     for a in range(names):
         assigned.lower[a] = wp.vec3(FAR, FAR, FAR)
         assigned.upper[a] = wp.vec3(-FAR, -FAR, -FAR)
-    # first how many there are: those of part a are counted in place a + 1
+    # first pass: count the samples; those of part a at index a + 1
     for i in range(most):
         if shown[samples.own[i], samples.other[i]] > 0.0:
             for side in range(2):
@@ -157,7 +157,7 @@ def assign_samples(
 """
 )
 def next_near(assigned: Assigned, point: wp.vec3, begin: int, end: int) -> int:
-    """The first of the samples in places from ``begin`` to ``end`` that a point lies within the radius of."""
+    """First sample with an index from ``begin`` to ``end`` whose radius contains a point."""
 
 
 @wp.kernel

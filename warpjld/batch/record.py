@@ -68,7 +68,7 @@ def read_record(out: Path, name: str) -> ClipRecord | None:
 
 
 def _is_sound(record: ClipRecord) -> bool:
-    """Whether all that a record says is of the type that it should be, and its names may be those of files."""
+    """Whether all values of a record have the expected types, and its names are valid file names."""
     texts: list[object] = [record.name, record.motion, record.motion_sha256, record.status, record.message]
     lists: tuple[object, ...] = (record.warnings, record.notes)
     if not all(isinstance(one, list) for one in lists) or not isinstance(record.files, dict):

@@ -124,12 +124,14 @@ def _kept(session: Session) -> str:
 
 
 def _watch_terminal() -> None:
-    """Send this process SIGHUP when its terminal is gone: the system does so only where the terminal controls the
-    process, and prompt_toolkit reads one that is gone again and again."""
+    """Send this process SIGHUP when its terminal closes.
+
+    The system does so only if it is the process's controlling terminal, and prompt_toolkit keeps reading a closed one.
+    """
     if not (hasattr(select, "poll") and hasattr(signal, "SIGHUP")):
         return
     terminal = select.poll()
-    terminal.register(sys.stdin, 0)  # hanging up is always told
+    terminal.register(sys.stdin, 0)  # POLLHUP is always reported
 
     def wait() -> None:
         if any(told & select.POLLHUP for _, told in terminal.poll()):

@@ -1,4 +1,4 @@
-"""Whether a binding from a file holds what kernels may be given: they index memory with its numbers, unchecked."""
+"""Validation of the arrays of a stored binding; kernels index memory with them without bounds checks."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _LANES = 32  # vertices that one thread computes at once, see ``warpjld_kernels.
 
 
 def check_runs(runs: Runs, skeleton: Skeleton, anchors: Anchors, vertices: int) -> None:
-    """Make sure that every index of packed runs lies in its array.
+    """Check that every index of packed runs lies within its array.
 
     Raises:
-        ValueError: One does not, or an array has another shape or type.
+        ValueError: An index is out of range, or an array has another shape or type.
     """
     columns = Columns(len(skeleton), len(anchors.ends), len(anchors.pairs))
     if runs.columns != columns:
@@ -34,9 +34,9 @@ def check_runs(runs: Runs, skeleton: Skeleton, anchors: Anchors, vertices: int) 
     first, length, coefficient, slot, *kinds = runs.runs.astype(np.int64).T
     counts = np.stack(kinds, axis=1)
     if (runs.runs < 0).any() or (length < _LANES).any() or (np.cumsum(length) - length != first).any():
-        raise ValueError("its runs do not follow one another")
+        raise ValueError("runs are not contiguous")
     if int(length.sum()) != len(runs.order) or len(np.unique(runs.order)) != vertices:
-        raise ValueError("its runs do not hold every vertex")
+        raise ValueError("runs do not contain every vertex once")
     if ((coefficient + length * (counts @ [1, 1, 1, 3] + 3)) > len(runs.coefficients)).any():
         raise ValueError("a run reads beyond its coefficients")
     if ((slot + counts.sum(axis=1)) > len(runs.slots)).any():
@@ -49,20 +49,20 @@ def check_runs(runs: Runs, skeleton: Skeleton, anchors: Anchors, vertices: int) 
 
 
 def _check_slots(slots: NDArray[np.int32], counts: list[int], columns: Columns) -> None:
-    """Slots of a run: positions, rotations, scales and muscles, of 3, 4, 1 and 1 columns."""
+    """Check the slots of a run: positions, rotations, scales and muscles, of 3, 4, 1 and 1 palette columns each."""
     begin = 0
     for count, first, end, width in zip(counts, columns.kinds[:-1], columns.kinds[1:], (3, 4, 1, 1), strict=True):
-        some = slots[begin : begin + count]
-        if len(some) and not first <= some.min() <= some.max() <= end - width:
-            raise ValueError("a slot is none of the palette's columns of its kind")
+        of_kind = slots[begin : begin + count]
+        if len(of_kind) and not first <= of_kind.min() <= of_kind.max() <= end - width:
+            raise ValueError("a slot is not a palette column of its kind")
         begin += count
 
 
 def check_anchors(anchors: Anchors, skeleton: Skeleton) -> None:
-    """Make sure that coordinates of vertices are those of a skeleton's segments.
+    """Check that the anchors of the vertices refer to joints, segments and segment pairs that exist.
 
     Raises:
-        ValueError: They are not.
+        ValueError: An index is out of range, or an array has another shape or type.
     """
     count, segments, pairs = len(anchors.rest), len(anchors.ends), len(anchors.pairs)
     joints = (0, len(skeleton))
@@ -78,15 +78,15 @@ def check_anchors(anchors: Anchors, skeleton: Skeleton) -> None:
     check_array("between", anchors.between, (count, 2), np.float64)
     check_array("station", anchors.station, (count, 2), np.float64)
     if anchors.station.size and not 0.0 <= anchors.station.min() <= anchors.station.max() <= STATIONS - 1:
-        raise ValueError("station: beyond its pair")
+        raise ValueError(f"station: want values from 0 to {STATIONS - 1}")
     check_array("rigid", anchors.rigid, (count,), np.int32, within=(-1, len(skeleton)))
 
 
 def check_sparse(name: str, parts: Mapping[str, NDArray[Any]], shape: tuple[int, int]) -> None:
-    """Make sure that the arrays of a sparse matrix (CSR) of a shape are one.
+    """Check that arrays form a valid sparse matrix (CSR) of the given shape.
 
     Raises:
-        ValueError: They are not.
+        ValueError: They do not.
     """
     check_array(f"{name}.shape", parts["shape"], (2,), np.int64)
     if tuple(parts["shape"].tolist()) != shape:
@@ -95,11 +95,11 @@ def check_sparse(name: str, parts: Mapping[str, NDArray[Any]], shape: tuple[int,
     check_array(f"{name}.data", parts["data"], (None,), np.float64)
     for part, want, within in (("indices", entries, (0, shape[1])), ("indptr", (shape[0] + 1,), (0, entries[0] + 1))):
         if parts[part].dtype not in (np.int32, np.int64):
-            raise ValueError(f"{name}.{part}: no indices")
+            raise ValueError(f"{name}.{part}: want int32 or int64, got {parts[part].dtype}")
         check_array(f"{name}.{part}", parts[part], want, parts[part].dtype, within=within)
     rows = parts["indptr"]
     if rows[0] != 0 or rows[-1] != entries[0] or (np.diff(rows) < 0).any():
-        raise ValueError(f"{name}: its rows do not follow one another")
+        raise ValueError(f"{name}: row pointers are not ascending from 0 to the number of entries")
 
 
 def check_array(
@@ -110,10 +110,17 @@ def check_array(
     *,
     within: tuple[int, int] | None = None,
 ) -> None:
-    """Make sure of an array's type and shape, None for any length, and that it is finite and within a range.
+    """Check the dtype, shape (None: any length), finiteness and range of an array.
+
+    Args:
+        name: Name of the array, for messages.
+        array: The array.
+        shape: Expected shape, None for an axis of any length.
+        kind: Expected dtype.
+        within: Lowest value, and one more than the highest value.
 
     Raises:
-        ValueError: It is another one.
+        ValueError: One of them does not match.
     """
     fits = array.ndim == len(shape) and all(want in (None, got) for want, got in zip(shape, array.shape, strict=True))
     if array.dtype != np.dtype(kind) or not fits:

@@ -227,10 +227,10 @@ class Covering:
             yield start, self.deform(block, device=device, threads=threads, out=buffer[: len(block)], order=order)
 
     def show(self, poses: Poses | None = None, *, rate: float = 25.0) -> SurfaceView:
-        """The surface in poses, at rest where none are given, for a notebook to show (extra ``studio``).
+        """Interactive view of the surface in poses, by default at rest, for notebooks (extra ``studio``).
 
         Raises:
-            InputError: Poses of another skeleton, or none.
+            InputError: Poses of another skeleton, or no pose.
             MissingExtraError: viser is not installed.
         """
         from warpjld.page.view import SurfaceView, ViewedSurface

@@ -156,7 +156,7 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
 
 
 def _check(covering: Covering, runs: Runs, kept: _KeptFields, swelling: NDArray[np.float64]) -> None:
-    """Make sure that all fits the rig, and that no index lies outside its array; ValueError or InputError otherwise."""
+    """Check that a stored binding matches the rig and that its indices are valid; else ValueError or InputError."""
     skeleton, count, segments = covering.skeleton, len(covering.surface.vertices), len(covering.anchors.ends)
     joints, stations = len(skeleton), STATIONS * len(covering.anchors.pairs)
     for name, array in vars(default_parameters(skeleton)).items():

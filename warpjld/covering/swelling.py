@@ -47,8 +47,8 @@ __all__ = ["volume_keeping"]
 # proportion to it
 _PARTS = (0.33, 0.67, 1.0)
 _WIDEST = np.radians(110.0)  # largest flexion that is measured: beyond, limbs touch each other
-_MOST = 1.0  # upper bound of the amplitudes: with 6/5 no volume is nearer to that at rest, and fingers meet sooner
-_ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of those of its rank
+_MOST = 1.0  # upper bound of the amplitudes; with 6/5 volume is preserved no better, and fingers collide earlier
+_ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of the joints of its rank
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _ABDUCTION = CHANNELS.index("abduction")
 
@@ -120,8 +120,8 @@ def _together(
 
 
 def _ranks(skeleton: Skeleton) -> list[NDArray[np.int64]]:
-    """Joints of the same rank: equally many joints beyond the same joint with several children, and flexing about
-    nearly the same axis, as fingers do and a thumb beside them does not."""
+    """Groups of joints of the same rank: at the same depth below the same branching joint, with nearly the same flexion
+    axis. Fingers form such groups; the thumb beside them does not belong to them."""
     ranks: dict[tuple[int, int], list[int]] = {}
     for joint in range(len(skeleton)):
         above, steps = int(skeleton.parents[joint]), 1
@@ -168,7 +168,7 @@ class _Bending:
         self._corners = sp.vstack([sp.eye_array(count, format="csr"), mean], format="csr")
 
     def whole(self, amplitudes: NDArray[np.float64]) -> _Part:
-        """All of the surface, whose joints swell by these amplitudes, shape (J,)."""
+        """Whole surface, for joints with these swelling amplitudes, shape (J,)."""
         rows, initial = self._rows, initial_ratio(self._skeleton)
         swelling = self._swellings @ amplitudes
         at_rest = (self._swellings @ (initial * amplitudes)) / (1.0 + rows.scales[:, : len(initial)] @ initial)

@@ -1,4 +1,4 @@
-"""Bones as surfaces from a file, in place of round shafts along the segments (B §3.3 Fig. 7, R105)."""
+"""Bone surfaces read from a file, which replace the default cylinders along the segments (B §3.3 Fig. 7, R105)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from warpjld.rig import Rig
 __all__ = ["BoneSurface", "SurfaceBone", "bones_of_segments", "read_bones"]
 
 _NEAR = 0.5
-"""Distance of a bone's middle from its segment, over the segment's length, from which on it is none of this rig's."""
+"""Largest accepted distance of a bone's centroid from its segment, relative to the segment's length."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoneSurface:
-    """One bone.
+    """Surface of one bone.
 
     Attributes:
-        name: In the file: the joint that its segment ends at, or anything.
-        vertices: In the rig's frame at rest [m], shape (n, 3).
+        name: Name in the file; if it is a joint's name, the bone belongs to the segment that ends at this joint.
+        vertices: Rest positions in the rig's frame [m], shape (n, 3).
         faces: Triangles, shape (t, 3).
     """
 
@@ -40,7 +40,7 @@ class BoneSurface:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceBone(Bone):
-    """A bone with the shape of a surface; its shaft says where along the segment it lies."""
+    """Bone with the shape of a surface; its inherited shaft gives its extent along the segment."""
 
     surface: BoneSurface
 
@@ -54,10 +54,10 @@ class SurfaceBone(Bone):
 
 
 def read_bones(path: Path, rig: Rig) -> tuple[BoneSurface, ...]:
-    """The parts of a surface file, in the units and axes of the rig's own file.
+    """Read the parts of a surface file, given in the units and axes of the rig's own file, as bones.
 
     Raises:
-        InputError: Unreadable.
+        InputError: The file cannot be read.
     """
     file = read_mesh(path)
     vertices = file.vertices @ rig.placing[:3, :3].T + rig.placing[:3, 3]
@@ -70,10 +70,13 @@ def read_bones(path: Path, rig: Rig) -> tuple[BoneSurface, ...]:
 
 
 def bones_of_segments(rig: Rig, bones: Sequence[BoneSurface]) -> dict[int, BoneSurface]:
-    """Bones by the joint that their segment ends at: by their names, else by the segment that is nearest.
+    """Assign bones to segments, by the bone's name or else to the nearest segment.
+
+    Returns:
+        Bones, keyed by the joint at the distal end of their segment.
 
     Raises:
-        InputError: A bone that is nowhere near a segment, or two for one.
+        InputError: A bone is too far from every segment, or two bones belong to the same segment.
     """
     skeleton = rig.skeleton
     out: dict[int, BoneSurface] = {}
@@ -87,7 +90,7 @@ def bones_of_segments(rig: Rig, bones: Sequence[BoneSurface]) -> dict[int, BoneS
 
 
 def _nearest(rig: Rig, bone: BoneSurface) -> int:
-    """Joint at the far end of the segment that is nearest to a bone's middle."""
+    """Joint at the distal end of the segment that is nearest to a bone's centroid."""
     skeleton, middle = rig.skeleton, bone.vertices.mean(axis=0)
     joints = np.flatnonzero(skeleton.parents >= 0)
     start, end = skeleton.rest[skeleton.parents[joints]], skeleton.rest[joints]
@@ -95,7 +98,7 @@ def _nearest(rig: Rig, bone: BoneSurface) -> int:
     length = np.maximum((along**2).sum(axis=1), 1e-18)
     share = np.clip(((middle - start) * along).sum(axis=1) / length, 0.0, 1.0)
     away = np.linalg.norm(start + share[:, None] * along - middle, axis=1)
-    # a middle at an end of a segment belongs to it less than one at its middle
+    # prefer segments whose middle is near the centroid over those with an end near it
     best = int(np.argmin(away + 0.1 * np.sqrt(length) * np.abs(share - 0.5)))
     if away[best] > _NEAR * np.sqrt(length[best]):
         raise InputError(

@@ -87,7 +87,7 @@ def flesh_of(
         head: Likewise at the distal end where another segment follows, ``gap`` by default; small, so that the head of
             the bone forms the knuckle.
         least: Smallest scaled Jacobian.
-        bones: Surfaces of bones, in place of round ones along their segments.
+        bones: Surfaces of bones, which replace the default cylinders along their segments.
 
     Raises:
         InputError: Shares that give no bone, a surface that cannot be meshed, or no bone at this spacing.

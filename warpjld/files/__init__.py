@@ -1,1 +1,1 @@
-"""Files that are read and written: whole or not at all, checked before work, kept between processes."""
+"""File access: checked reading, atomic writing, and a cache of computed values."""

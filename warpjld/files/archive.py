@@ -1,4 +1,4 @@
-"""Zip archives looked at before anything of them is unpacked."""
+"""Size checks of zip archives before unpacking."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ __all__ = ["check_archive"]
 
 
 def check_archive(path: str | Path, kind: str = "zip archive") -> None:
-    """Make sure that an archive holds no more than the limits ``members`` and ``unpacked-bytes`` allow.
+    """Check that an archive does not exceed the limits ``members`` and ``unpacked-bytes``.
 
-    Sizes are those that the archive's directory states; Python's ``zipfile`` unpacks no more than it does.
+    Sizes are those stated in the archive's directory; Python's ``zipfile`` unpacks no more than these.
 
     Args:
         path: The archive.
-        kind: What it should be, for messages.
+        kind: Expected kind of file, for messages.
 
     Raises:
-        InputError: It does, or is no archive.
+        InputError: It exceeds them, or is not an archive.
     """
     try:
         with zipfile.ZipFile(path) as file:

@@ -22,7 +22,7 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     """Arrays of an ``.npz`` file by name; the array of an ``.npy`` file has the name "".
 
     Raises:
-        InputError: Unreadable, not a NumPy file, with pickled objects, or larger than ``unpacked-bytes`` allows.
+        InputError: The file cannot be read, is not a NumPy file, has pickled objects, or exceeds ``unpacked-bytes``.
     """
     path = Path(path)
     check_input(path)

@@ -1,4 +1,4 @@
-"""One process at a time in a folder."""
+"""Exclusive lock of a folder, held by one process at a time."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ __all__ = ["locked_folder"]
 
 @contextmanager
 def locked_folder(folder: Path, file: str) -> Iterator[None]:
-    """Keep other processes out of a folder while the statement lasts.
+    """Context in which this process holds an exclusive lock of a folder.
 
-    The system drops the lock when its process ends, however it ends: none is left behind. Folders of file systems
-    that know no locks are not locked.
+    The operating system releases the lock when the process ends for any reason. Folders on file systems without locks
+    are not locked.
 
     Args:
         folder: The folder.
-        file: Name of the file in it that is locked; it stays.
+        file: Name of the lock file in it, which is not removed.
 
     Raises:
-        InputError: Another process works in the folder.
-        OSError: The file cannot be made.
+        InputError: Another process holds the lock.
+        OSError: The lock file cannot be created.
     """
     with (folder / file).open("a+b") as handle:
         try:

@@ -1,4 +1,4 @@
-"""Folders that results go into."""
+"""Creation of output folders."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ __all__ = ["make_folder"]
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and those above it, where they are missing.
+    """Create a folder and its parents if they are missing.
 
     Raises:
-        InputError: It cannot be made: a file stands there, or the disk refuses.
+        InputError: The folder cannot be created, for example because a file has its name.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Files that are read: regular ones, and none larger than the limit."""
+"""Opening of input files: regular files only, not larger than the limit."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ __all__ = ["check_input", "open_input", "read_bytes"]
 
 
 def open_input(path: str | Path) -> BinaryIO:
-    """A file opened for reading; pipes and devices, which may never end or start something, are not.
+    """Open a regular file for reading; pipes and devices, which may block or have side effects, are refused.
 
     Raises:
-        InputError: It cannot be opened, is no regular file, or is larger than the limit ``file-bytes``.
+        InputError: The file cannot be opened, is not a regular file, or is larger than the limit ``file-bytes``.
     """
     try:
-        # without waiting: a pipe that nobody writes into would hold on for ever
+        # non-blocking: opening a pipe without a writer would block for ever
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", path=path) from None
@@ -40,7 +40,7 @@ def open_input(path: str | Path) -> BinaryIO:
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """All of a file. Raises as ``open_input``."""
+    """Content of a file; raises as ``open_input``."""
     with open_input(path) as file:
         try:
             return file.read()
@@ -49,5 +49,5 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def check_input(path: str | Path) -> None:
-    """Make sure that a library may open a file. Raises as ``open_input``."""
+    """Check that a library may open a file; raises as ``open_input``."""
     open_input(path).close()

@@ -1,6 +1,6 @@
-"""What is worth keeping from one process to the next, as files in the user's cache folder.
+"""Cache files in the user's cache folder, with removal of the least recently used ones.
 
-The ones longest unused go. Whatever they hold can be made again, so a folder that cannot be written is no fault.
+The content can always be computed again, so failure to write the folder is not an error.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from warpjld.files.whole_file import whole_file
 __all__ = ["CACHE_VARIABLE", "keep", "kept_folder", "used"]
 
 CACHE_VARIABLE = "WARPJLD_CACHE"
-"""Environment variable: the folder in which bindings and hands are kept, or ``off``."""
+"""Environment variable with the cache folder of bindings and hands, or ``off``."""
 
-_MOST = 64  # files in the folder, and
-_MOST_BYTES = 2**30  # all together
+_MOST = 64  # largest number of files
+_MOST_BYTES = 2**30  # largest total size
 
 
 def kept_folder() -> Path | None:
-    """Where files are kept; None where they are not."""
+    """Cache folder; None if caching is off."""
     stated = os.environ.get(CACHE_VARIABLE)
     if stated is not None:
         return None if stated.strip().lower() in ("", "0", "off", "no") else Path(stated)
@@ -41,7 +41,7 @@ def kept_folder() -> Path | None:
 
 
 def keep(file: Path, write: Callable[[Path], None]) -> None:
-    """Keep a file that ``write`` writes, if the folder can be written, and let go of what was not used for longest."""
+    """Write a cache file by ``write``, if the folder can be written, and remove the least recently used files."""
     with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(file) as part:
@@ -50,7 +50,7 @@ def keep(file: Path, write: Callable[[Path], None]) -> None:
 
 
 def used(file: Path) -> None:
-    """Note that a kept file is still wanted."""
+    """Mark a cache file as used now."""
     with contextlib.suppress(OSError):
         os.utime(file)
 
@@ -60,7 +60,7 @@ def _tidy(folder: Path) -> None:
     for file in folder.glob("*.npz"):
         try:
             known.append((file.stat().st_mtime, file.stat().st_size, file))
-        except FileNotFoundError:  # another process tidies too
+        except FileNotFoundError:  # removed by another process
             continue
     size = 0
     for place, (_, its, file) in enumerate(sorted(known, key=lambda one: one[0], reverse=True)):

@@ -1,4 +1,4 @@
-"""Nested dataclasses of arrays in one NPZ file of the cache, found again by a hash of all that they follow from."""
+"""Cache of computed values, as nested dataclasses of arrays in NPZ files, keyed by a hash of their inputs."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _Value = TypeVar("_Value")
 def kept_value(
     what: str, key: str, classes: Sequence[type], make: Callable[[], _Value], *, modules: tuple[str, ...]
 ) -> tuple[_Value, tuple[str, ...]]:
-    """What ``make`` returns, out of a file of the cache where it was made before; and what is to be told of that.
+    """Result of ``make``, read from the cache if it was computed before; and messages about the cache.
 
     Args:
-        what: What it is, for people and for the file's name: a word.
-        key: Hash of what is given to ``make`` (see ``hash_of``); that of the programs is added.
-        classes: Dataclasses it consists of, beside arrays, tuples, dictionaries, numbers and strings.
-        make: Makes it.
-        modules: Patterns of the package's files that ``make`` runs through; all kernels count as well.
+        what: Kind of value, one word, for messages and the file name.
+        key: Hash of the inputs of ``make`` (see ``hash_of``); a hash of the source code is added.
+        classes: Dataclasses it consists of, besides arrays, tuples, dictionaries, numbers and strings.
+        make: Function that computes the value.
+        modules: Glob patterns of the package's modules that ``make`` depends on; all kernels are included.
     """
     folder = kept_folder()
     if folder is None:
@@ -55,7 +55,7 @@ def kept_value(
 
 
 def hash_of(*values: Any) -> str:
-    """Hash of every number, string and array in nested values, and of what each is."""
+    """Hash of all numbers, strings and arrays in nested values, including their types."""
     arrays: list[NDArray[Any]] = []
     digest = hashlib.sha256(json.dumps([_plain(value, arrays) for value in values]).encode())
     for array in arrays:
@@ -65,7 +65,7 @@ def hash_of(*values: Any) -> str:
 
 
 def _plain(value: Any, arrays: list[NDArray[Any]]) -> Any:
-    """A value as JSON has it; its arrays are added to a list, and stand in it by their place there."""
+    """JSON-compatible form of a value; arrays are appended to a list, and replaced by their index in it."""
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return ["array", len(arrays) - 1]

@@ -1,4 +1,4 @@
-"""What a study was made of and how it ran: everything about it that is no result."""
+"""Manifest of a study: hashes of inputs and settings, and software versions."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def file_hash(path: Path) -> str:
 
 
 def fingerprint(identity: dict[str, Any]) -> str:
-    """SHA-256 of settings, whatever their order."""
+    """SHA-256 of settings, independent of their order."""
     return hashlib.sha256(
         json.dumps(identity, sort_keys=True, ensure_ascii=False).encode("utf-8", "backslashreplace")
     ).hexdigest()
 
 
 def versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str | None]:
-    """Versions of what computes, and of where; None for what is not installed."""
+    """Versions of packages, of Python and of the platform; None for packages that are not installed."""
     found: dict[str, str | None] = {}
     for name in packages:
         try:
@@ -47,7 +47,7 @@ def versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str | None]:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write a JSON file, whole or not at all."""
+    """Write a JSON file atomically."""
     with whole_file(path) as part:
         text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
-        part.write_bytes(text.encode("utf-8", "backslashreplace"))  # bytes of names that are no UTF-8, as JSON has them
+        part.write_bytes(text.encode("utf-8", "backslashreplace"))  # names with bytes that are not UTF-8 are escaped

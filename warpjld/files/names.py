@@ -1,4 +1,4 @@
-"""Names that become files or labels, checked before any work."""
+"""Validation of names that are used as file names or labels."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from warpjld.errors import InputError
 __all__ = ["check_name", "clash", "expanded", "folded"]
 
 _LONGEST = 180
-"""Bytes of a name in UTF-8: file systems take 255, of which an actor's or a step's name and a suffix need some."""
+"""Longest name in UTF-8 [bytes]: file systems allow 255, part of which a prefix and a suffix need."""
 _SIGNS = '/\\<>:"|?*$'
-"""What some file system takes for something else than a letter, and what begins a formula in labels of plots."""
+"""Characters that are special to some file system, and ``$``, which begins a formula in plot labels."""
 
 
 def check_name(name: str, what: str) -> str:
-    """The name, if every file system takes it as the name of a file.
+    """Return the name if it is a valid file name on all file systems.
 
     Args:
-        name: Without folders.
-        what: Called so in messages.
+        name: Name without folders.
+        what: Description of the name, for messages.
 
     Raises:
-        InputError: It is empty, too long, no Unicode, or holds a sign that is no part of a name.
+        InputError: The name is empty, too long, not Unicode, or has an invalid character.
     """
     problem = ""
     try:
         size = len(name.encode("utf-8"))
-    except UnicodeEncodeError:  # bytes of a file name that are no UTF-8
+    except UnicodeEncodeError:  # file name with bytes that are not UTF-8
         raise InputError(f"{what} {name!r:.60}: want Unicode text") from None
     strange = next((sign for sign in name if sign in _SIGNS or not sign.isprintable()), None)
     if not name.strip(" .") or name != name.strip():
@@ -45,12 +45,12 @@ def check_name(name: str, what: str) -> str:
 
 
 def folded(name: str | Path) -> str:
-    """A name as file systems compare it that tell neither case nor ways of writing an accent apart."""
+    """Name as compared by file systems that ignore case and Unicode normalisation."""
     return unicodedata.normalize("NFC", str(name)).casefold()
 
 
 def clash(names: Iterable[str]) -> tuple[str, str] | None:
-    """The first two names that are one file where case is not told apart."""
+    """First two names that are the same file on file systems that ignore case; None if there are none."""
     seen: dict[str, str] = {}
     for name in names:
         key = folded(name)
@@ -61,5 +61,5 @@ def clash(names: Iterable[str]) -> tuple[str, str] | None:
 
 
 def expanded(name: str) -> Path:
-    """A path with ``~`` and ``~user`` put in; of a user that is not known it stays as it is."""
+    """Path with ``~`` and ``~user`` expanded; unchanged if the user is unknown."""
     return Path(os.path.expanduser(name))

@@ -1,4 +1,4 @@
-"""How deeply brackets of a text lie inside one another, counted before a parser that climbs into them."""
+"""Nesting depth of brackets in a text, checked before it is given to a recursive parser."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import numpy as np
 
 __all__ = ["nesting"]
 
-_QUOTE = 2  # mark of a quotation mark, beside +1 and -1 for brackets
+_QUOTE = 2  # code of a quotation mark; brackets have +1 and -1
 
 
 def nesting(raw: bytes, opening: bytes = b"[{", closing: bytes = b"]}") -> int:
-    """The most brackets that are open at once; those inside double quotes do not count.
+    """Largest nesting depth of brackets, not counting those inside double quotes.
 
     Args:
         raw: The text.
-        opening: Brackets that open.
-        closing: Brackets that close.
+        opening: Opening brackets.
+        closing: Closing brackets.
     """
-    plain = raw.replace(b"\\\\", b"").replace(b'\\"', b"") if b"\\" in raw else raw  # escaped quotes end no text
+    plain = raw.replace(b"\\\\", b"").replace(b'\\"', b"") if b"\\" in raw else raw  # escaped quotes end no string
     marks = opening + closing + b'"'
     step = np.zeros(256, dtype=np.int8)
     step[list(opening)], step[list(closing)], step[ord('"')] = 1, -1, _QUOTE

@@ -1,4 +1,4 @@
-"""Refusing to write over what is read."""
+"""Check that outputs do not overwrite inputs."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["check_outputs"]
 
 
 def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Make sure that files can be written without losing what they are made of, or one another.
+    """Check that outputs overwrite neither inputs nor each other.
 
     Args:
-        outputs: Files to write, each once.
-        inputs: Files that are read, also by links.
+        outputs: Files to write.
+        inputs: Files to read; links are resolved.
 
     Raises:
-        InputError: One of them is read too, or is to be written twice.
+        InputError: An output is also an input, or occurs twice.
     """
     outputs = list(outputs)
     read = {_place(path): path for path in inputs}

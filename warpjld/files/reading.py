@@ -1,4 +1,4 @@
-"""The boundary around parsers: whatever one raises becomes an ``InputError`` that names the file."""
+"""Conversion of exceptions raised by parsers to an ``InputError`` that names the file."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ __all__ = ["reading"]
 
 @contextmanager
 def reading(path: str | Path, kind: str, *, but: type[Exception] | tuple[type[Exception], ...] = ()) -> Iterator[None]:
-    """While the statement lasts a file is read: its content may be anything, and libraries raise anything at it.
+    """Context in which a file is parsed; exceptions of any type are reported as an invalid file.
 
-    Only what turns bytes into values belongs inside, so that a fault of the program's own is not taken for the file's.
+    It should contain parsing only, so that errors of the program itself are not reported as errors of the file.
 
     Args:
-        path: The file; put into those errors that name none.
-        kind: What it is read as, for the message: ``OBJ``, ``a glTF 2.0 file``.
-        but: What is left as it is, since the reader tells it better.
+        path: The file; added to an ``InputError`` without a file.
+        kind: File format, for the message: ``OBJ``, ``a glTF 2.0 file``.
+        but: Exceptions that are passed on, since the reader handles them.
 
     Raises:
-        InputError: The file cannot be read as that; the first error is its cause.
+        InputError: The file cannot be read in this format; the original exception is its cause.
     """
     try:
         yield
@@ -46,7 +46,7 @@ def reading(path: str | Path, kind: str, *, but: type[Exception] | tuple[type[Ex
 
 
 def _said(error: Exception) -> str:
-    """What an exception says, told so that it means something without its traceback."""
+    """Message of an exception that can be understood without its traceback."""
     text = str(error).strip().splitlines()[0][:200] if str(error).strip() else ""
     if isinstance(error, KeyError):
         return f"{text} is missing"

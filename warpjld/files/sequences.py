@@ -1,4 +1,4 @@
-"""Numbered files that tools read as one sequence: frames of a longer one that stood there before are removed."""
+"""Removal of stale frames of numbered file sequences, which tools would read as part of the new sequence."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _KINDS = tuple(
 
 
 def remove_former(files: Iterable[Path]) -> None:
-    """Remove what would be read as one sequence with these files, and is none of them.
+    """Remove other files that belong to the same numbered sequences.
 
     Args:
-        files: Everything that was just written.
+        files: All files of the new sequences.
     """
     written: dict[Path, set[str]] = {}
     wanted: dict[Path, set[tuple[str, str]]] = {}
@@ -39,7 +39,7 @@ def remove_former(files: Iterable[Path]) -> None:
 
 
 def _sequence(name: str) -> tuple[str, str] | None:
-    """What the names of a sequence share."""
+    """Prefix and suffix shared by the names of a sequence; None for a name without a number."""
     for kind in _KINDS:
         if found := kind.fullmatch(name):
             return found["stem"].lower(), found["suffix"].lower()

@@ -1,4 +1,4 @@
-"""The program's own files: what is kept from one process to the next counts for the programs that made it alone."""
+"""Hash of the package's source code, so that cached values are used only by the code that made them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["hash_of_sources", "source_files"]
 
 
 def source_files(patterns: tuple[str, ...]) -> Iterator[tuple[str, Path]]:
-    """Names and places of modules of the package, by glob patterns, and of all kernels, always in the same order."""
+    """Names and paths of the package's modules that match glob patterns, and of all kernels, in a fixed order."""
     import warpjld_kernels
 
     import warpjld
@@ -24,7 +24,7 @@ def source_files(patterns: tuple[str, ...]) -> Iterator[tuple[str, Path]]:
 
 @cache
 def hash_of_sources(patterns: tuple[str, ...]) -> str:
-    """Of their content: a version under way changes without its number, and times and sizes of files say too little."""
+    """Hash of the content of source files; version numbers, times and sizes do not identify code under development."""
     digest = hashlib.sha256()
     for name, file in source_files(patterns):
         digest.update(name.encode())

@@ -1,4 +1,4 @@
-"""Tables of numbers that may be longer than memory: rows beyond the first megabytes lie in a temporary file."""
+"""Append-only table of float64 rows, kept in memory up to some megabytes and then in a temporary file."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _BLOCK = 1024  # rows read at once
 
 
 class SpilledRows:
-    """Rows of float64 numbers that are added one after another, and read in any order.
+    """Rows of float64 numbers that are appended, and read by slices.
 
     Args:
-        width: Numbers of a row.
+        width: Count of numbers in a row.
     """
 
     def __init__(self, width: int) -> None:
@@ -33,14 +33,14 @@ class SpilledRows:
         return self._count
 
     def extend_from(self, path: str | Path) -> None:
-        """Add rows from a file that holds them as they lie in memory."""
+        """Append rows from a binary file: contiguous float64 in native byte order."""
         with Path(path).open("rb") as rows:
             row = 8 * max(self._width, 1)
             while data := rows.read(max(_IN_MEMORY // row, 1) * row):
                 self.extend(np.frombuffer(data, dtype=np.float64).reshape(-1, self._width))
 
     def extend(self, rows: NDArray[np.float64]) -> None:
-        """Add rows, shape (n, width)."""
+        """Append rows, shape (n, width)."""
         with self._lock:
             self._file.seek(0, 2)
             self._file.write(np.ascontiguousarray(rows, dtype=np.float64).tobytes())
@@ -56,6 +56,6 @@ class SpilledRows:
         return np.frombuffer(data, dtype=np.float64).reshape(count, self._width).copy()
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
-        """All rows, some at a time."""
+        """All rows, in blocks of at most 1024."""
         for start in range(0, self._count, _BLOCK):
             yield self[start : start + _BLOCK]

@@ -1,4 +1,4 @@
-"""Reading files that people write: UTF-8 text, and JSON."""
+"""Reading of text files (UTF-8 or UTF-16) and JSON."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ __all__ = ["parse_json", "read_json", "read_text", "text_lines"]
 
 
 def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "strict") -> str:
-    """All of a UTF-8 file with ``\\n`` as its ends of lines, without the byte order mark that some editors put first.
+    """Content of a UTF-8 text file, with line ends ``\\n`` and without a byte order mark.
 
-    UTF-16 is read where a byte order mark says so, as Windows PowerShell writes it.
+    A UTF-16 byte order mark, as written by Windows PowerShell, selects UTF-16.
 
     Args:
         path: The file.
-        errors: ``replace`` where the text may hold names in other encodings.
+        errors: ``replace`` for files that may have names in other encodings.
 
     Raises:
-        InputError: It cannot be read, or is no such text.
+        InputError: The file cannot be read, or is not text in this encoding.
     """
     raw = read_bytes(path)
     try:
@@ -40,10 +40,10 @@ def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "stric
 
 
 def text_lines(path: str | Path) -> Iterator[str]:
-    """Lines of a text as ``read_text`` has it, read as they are asked for; what is no such text is replaced.
+    """Iterate over the lines of a text file, decoded as by ``read_text``; invalid bytes are replaced.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: The file cannot be read.
     """
     with open_input(path) as raw:
         wide = raw.peek(2)[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # type: ignore[attr-defined]
@@ -56,22 +56,22 @@ def text_lines(path: str | Path) -> Iterator[str]:
 
 
 def read_json(path: str | Path) -> Any:
-    """What a JSON file holds; integers beyond 64 bits are floats, infinite ones where they have endless digits.
+    """Content of a JSON file; integers beyond 64 bits are read as floats, infinite if out of their range.
 
     Raises:
-        InputError: It cannot be read, or is not JSON: names line and column.
+        InputError: The file cannot be read, or is not JSON; names line and column.
     """
     return parse_json(read_text(path), path)
 
 
 def parse_json(text: str, path: str | Path) -> Any:
-    """What a JSON text of a file holds; raises as ``read_json``."""
+    """Content of the JSON text of a file; raises as ``read_json``."""
     check_limit("depth", nesting(text.encode("utf-8", "replace")), of="JSON", path=path)
     try:
         return json.loads(text, parse_int=_integer)
     except json.JSONDecodeError as error:
         raise InputError(f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from None
-    except RecursionError:  # where the limit was raised beyond what Python's reader takes
+    except RecursionError:  # possible if the limit is raised beyond that of Python's parser
         raise InputError("is not read: its JSON is nested more deeply than Python takes", path=path) from None
 
 

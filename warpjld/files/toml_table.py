@@ -1,4 +1,4 @@
-"""TOML files read strictly: every key is asked for, checked, and named where it is wrong."""
+"""Strict reading of TOML files: values are validated, and unknown keys are errors."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ __all__ = ["TomlTable", "read_toml"]
 
 
 def read_toml(path: str | Path) -> TomlTable:
-    """The top table of a file.
+    """Read the top-level table of a TOML file.
 
     Raises:
-        InputError: Unreadable, or not TOML.
+        InputError: The file cannot be read, or is not TOML.
     """
     text = read_text(path)
     try:
@@ -37,7 +37,7 @@ def read_toml(path: str | Path) -> TomlTable:
 
 
 def _loaded(text: str) -> dict[str, Any]:
-    """What a TOML text holds; whole numbers beyond 64 bits are floats, infinite ones where they have endless digits."""
+    """Content of a TOML text; integers beyond 64 bits are read as floats, infinite if out of their range."""
     content: dict[str, Any] = _plain(tomllib.loads(text))
     return content
 
@@ -53,13 +53,13 @@ def _plain(value: Any) -> Any:
 
 
 def _short(value: Any) -> str:
-    """A value as a message may show it."""
+    """Shortened form of a value for messages."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:60]}…"
 
 
 class TomlTable:
-    """A table whose keys are taken one by one; `finish` refuses the ones nobody asked for."""
+    """A table whose keys are read one by one; `finish` rejects keys that were not read."""
 
     def __init__(self, content: dict[str, Any], name: str, path: Path, lines: Sequence[str]) -> None:
         self._content, self._name, self._path, self._lines = content, name, path, lines
@@ -69,16 +69,16 @@ class TomlTable:
         return key in self._content
 
     def __iter__(self) -> Iterator[str]:
-        """Keys in the file's order."""
+        """Keys in the order of the file."""
         return iter(self._content)
 
     def is_table(self, key: str) -> bool:
-        """Whether a key is there and holds a table."""
+        """Whether a key exists and its value is a table."""
         return isinstance(self._content.get(key), dict)
 
     @property
     def name(self) -> str:
-        """Its own keys, from the top of the file."""
+        """Dotted path of the table from the top of the file."""
         return self._name
 
     @property
@@ -88,15 +88,15 @@ class TomlTable:
 
     @property
     def folder(self) -> Path:
-        """Folder of the file, which its relative paths start from."""
+        """Folder of the file, to which paths in it are relative."""
         return self._path.parent
 
     def fail(self, key: str, message: str) -> NoReturn:
-        """Raise InputError about a key, with the line it probably stands in."""
+        """Raise InputError about a key, with the line in which it is probably."""
         raise InputError(f"{self._called(key)}: {message}", path=self._path, line=self._line(key))
 
     def needed(self, *keys: str) -> None:
-        """Raise InputError where one of these keys is missing, or misspelt."""
+        """Raise InputError if one of these keys is missing or misspelt."""
         for key in keys:
             if key not in self._content:
                 for other in self._content:
@@ -116,14 +116,14 @@ class TomlTable:
         return value
 
     def truth(self, key: str, default: bool) -> bool:
-        """true or false."""
+        """A boolean."""
         value = self._take(key, default)
         if not isinstance(value, bool):
             self.fail(key, f"want true or false, got {_short(value)}")
         return value
 
     def integer(self, key: str, default: int | None = None, *, least: int = 0, within: str | None = None) -> int:
-        """A whole number; required where there is no default. ``within`` names the limit that it must keep to."""
+        """An integer, required if there is no default; ``within`` names a limit that it must not exceed."""
         if default is None:
             self.needed(key)
         value = self._take(key, default)
@@ -140,7 +140,7 @@ class TomlTable:
         self, key: str, default: float | None = None, *, above: float = -math.inf, least: float = -math.inf,
         most: float = math.inf,
     ) -> float | None:  # fmt: skip
-        """A finite number in range, or None where it is missing and has no default."""
+        """A finite number in range; None if it is missing and has no default."""
         value = self._take(key, default)
         return None if value is None else self._number(key, value, above, least, most)
 
@@ -148,7 +148,7 @@ class TomlTable:
         self, key: str, default: Sequence[float], *, above: float = -math.inf, least: float = -math.inf,
         most: float = math.inf, count: int | None = None,
     ) -> tuple[float, ...]:  # fmt: skip
-        """Finite numbers in range; one number stands for a list of one."""
+        """Finite numbers in range; a single number is read as a list of one."""
         value = self._take(key, list(default))
         items = value if isinstance(value, list) else [value]
         if not items or (count is not None and len(items) != count):
@@ -161,7 +161,7 @@ class TomlTable:
         return x, y, z
 
     def like(self, key: str, default: object) -> Any:
-        """A value of its default's kind; None stands for a whole number that may be missing."""
+        """A value of the same type as its default; for a default of None, an optional integer."""
         if key not in self._content:
             self._asked.append(key)
             return default
@@ -178,7 +178,7 @@ class TomlTable:
         return tuple(value) if isinstance(value, list) else (value,)
 
     def texts(self, key: str, default: Sequence[str], *, known: Sequence[str]) -> tuple[str, ...]:
-        """Different strings out of ``known``, one or more."""
+        """One or more distinct strings out of ``known``."""
         value = self._take(key, list(default))
         if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
             self.fail(key, f"want a list of names, got {_short(value)}")
@@ -190,29 +190,29 @@ class TomlTable:
         return tuple(value)
 
     def table(self, key: str) -> TomlTable:
-        """A table, empty where it is missing."""
+        """A table; empty if it is missing."""
         value = self._take(key, {})
         if not isinstance(value, dict):
             self.fail(key, f"want a table [{self._called(key)}], got {_short(value)}")
         return TomlTable(value, self._called(key), self._path, self._lines)
 
     def named_tables(self, key: str) -> dict[str, TomlTable]:
-        """Tables [key.NAME] by their names, none where the key is missing."""
+        """Tables ``[key.NAME]`` by name; empty if the key is missing."""
         table = self.table(key)
         return {name: table.table(name) for name in table}
 
     def tables(self, key: str, *, least: int = 1) -> list[TomlTable]:
-        """Tables [[key]], one or more unless fewer will do."""
+        """Tables ``[[key]]``, at least ``least`` of them."""
         value = self._take(key, [])
         if not isinstance(value, list) or len(value) < least or not all(isinstance(item, dict) for item in value):
             self.fail(key, f"want one or more tables [[{self._called(key)}]]")
         return [TomlTable(v, f"{self._called(key)}[{k}]", self._path, self._lines) for k, v in enumerate(value)]
 
     def finish(self, known: Sequence[str] = ()) -> None:
-        """Raise InputError where a key was never asked for: misspelt, or in the wrong table.
+        """Raise InputError if a key was not read: it is misspelt, or in the wrong table.
 
         Args:
-            known: Keys that could have been asked for, to be suggested too.
+            known: Further keys that may be suggested.
         """
         for key in self._content:
             if key not in self._asked:
@@ -237,7 +237,7 @@ class TomlTable:
         return f"{self._name}.{key}" if self._name else key
 
     def _line(self, key: str) -> int | None:
-        """Line of the key; in the k-th table of its name where tables repeat."""
+        """Line number of a key; for repeated tables, in the k-th one. None if not found."""
         header = re.sub(r"\[\d+\]", "", self._name)
         skip = [int(n) for n in re.findall(r"\[(\d+)\]", self._name)]
         current, seen = "", -1

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Atomic writing of files: a file is complete or does not exist."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _swept: set[str] = set()
 
 
 def machine() -> str:
-    """A short mark of this machine, for the names of temporary files: numbers of processes mean nothing on others."""
+    """Short identifier of this machine for names of temporary files, since process ids are only unique per machine."""
     return f"{zlib.crc32(platform.node().encode()):08x}"
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A place to write to that becomes ``path`` when the statement ends, and is removed where that fails.
+    """Context with a temporary file, which is renamed to ``path`` at the end, or removed after an exception.
 
-    It lies beside and has the same suffix, see ``part_of``. Several processes may write the same file: each writes a
-    whole one, and the last one stays. What processes that were killed left in the folder is removed.
+    It is in the same folder and has the same suffix, see ``part_of``. Several processes may write the same file: the
+    last complete one remains. Temporary files left in the folder by killed processes are removed.
     """
     sweep(path.parent)
     part = part_of(path)
@@ -38,13 +38,13 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def part_of(path: Path) -> Path:
-    """Temporary place beside a file, of this process alone: ``out/.table.part123-5c0f1d22.csv`` for ``out/table.csv``
+    """Temporary path next to a file, unique to this process: ``out/.table.part123-5c0f1d22.csv`` for ``out/table.csv``
     in process 123 of this machine."""
     return path.with_name(f".{path.stem}.part{os.getpid()}-{machine()}{path.suffix}")
 
 
 def sweep(folder: Path) -> None:
-    """Remove temporary files of this machine's processes that run no more, once a process and folder."""
+    """Remove temporary files of processes of this machine that have ended; once per process and folder."""
     place = os.path.abspath(folder)
     if place in _swept:
         return
@@ -59,7 +59,7 @@ def sweep(folder: Path) -> None:
 
 
 def process_runs(process: int) -> bool:
-    """Whether a process of that number runs on this machine; True where that cannot be told."""
+    """Whether a process with this id runs on this machine; True if that cannot be determined."""
     if os.name != "posix" or process == os.getpid():
         return True
     try:

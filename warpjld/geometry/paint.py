@@ -1,4 +1,4 @@
-"""Pictures on a surface: base colour textures of its file, by triangle (R135)."""
+"""Base colour textures of a surface, per triangle (R135)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class SurfacePaint:
     """Textures of T triangles.
 
     Attributes:
-        corner_uv: Texture coordinates of their corners, origin at a picture's lower left, shape (T, 3, 2).
-        image: Picture of each, -1 where it has none, shape (T,).
-        images: Pictures as their files hold them: PNG, JPEG, …
+        corner_uv: Texture coordinates of the corners, origin at the lower left of the image, shape (T, 3, 2).
+        image: Index into ``images`` for each triangle, -1 for none, shape (T,).
+        images: Encoded image files: PNG, JPEG, …
     """
 
     corner_uv: NDArray[np.float32]
@@ -28,7 +28,13 @@ class SurfacePaint:
 
 
 def paint_by_parts(corner_uv: NDArray[np.float32] | None, parts: tuple[Part, ...], count: int) -> SurfacePaint | None:
-    """Paint of a file's triangles, shape (S, 3, 2), by the pictures of its parts; None where no part has one."""
+    """Textures of the triangles of a file, taken from its parts; None if no part has a texture.
+
+    Args:
+        corner_uv: Texture coordinates of the triangles' corners, shape (S, 3, 2); None if the file has none.
+        parts: Parts of the file, with their triangles and textures.
+        count: Count S of triangles in the file.
+    """
     images: list[bytes] = []
     image = np.full(count, -1, np.int32)
     for part in parts:
@@ -42,7 +48,7 @@ def paint_by_parts(corner_uv: NDArray[np.float32] | None, parts: tuple[Part, ...
 
 
 def paint_of_surface(surface: Surface) -> SurfacePaint | None:
-    """Paint of a surface's own triangles, in their order; None where its file has no pictures."""
+    """Textures of a surface's triangles, in the order of ``surface.faces``; None if its file has no textures."""
     corner_uv = surface.corner_uv
     if corner_uv is None and surface.uv is not None:
         corner_uv = surface.uv[surface.source_faces]

@@ -18,8 +18,8 @@ _SEAM = 1e-6  # relative to the surface's size: border vertices of two parts nea
 
 @dataclass(frozen=True)
 class Part:
-    """One mesh of the source file: a range of source vertices and source faces, and its base colour texture, a picture
-    as its file holds it."""
+    """One mesh of the source file: ranges of source vertices and source faces, and its base colour texture, as an
+    encoded image."""
 
     name: str
     vertices: slice

@@ -22,7 +22,7 @@ AXES_TO_Y = {
     "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
     "x": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
 }
-"""Rotation that takes a file's axis which points up to Y."""
+"""Rotation that takes a file's up axis to Y."""
 
 
 def load_object(

@@ -73,13 +73,13 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class VolumeCells:
-    """The volume mesh of an object, from a file.
+    """Volume mesh of an object, read from a file.
 
     Attributes:
-        nodes: In the object's frame [m], shape (N, 3).
-        elements: Hexahedra, prisms and tetrahedra as degenerate ones among them, shape (E, 8).
-        regions: Region of each, shape (E,).
-        region_names: Of the regions.
+        nodes: Nodes in the object's frame [m], shape (N, 3).
+        elements: Node indices of hexahedra; prisms and tetrahedra are degenerate ones, shape (E, 8).
+        regions: Index of each element's region, shape (E,).
+        region_names: Names of the regions.
     """
 
     nodes: NDArray[np.float64]
@@ -259,13 +259,13 @@ def make_object(
 def _kept_paint(
     paint: SurfacePaint, before: NDArray[np.float64], now: NDArray[np.float64], rows: NDArray[np.int64]
 ) -> SurfacePaint:
-    """Paint of the triangles that are left: mending turns some of them, so that corners are found by their places.
+    """Textures of the triangles that remain after mending; corners are matched by position, since mending flips some.
 
     Args:
-        paint: Of all triangles.
-        before: Places of the corners of those that are left [m], shape (t, 3, 3).
-        now: The same as they are now.
-        rows: Their rows among all, shape (t,).
+        paint: Textures of all original triangles.
+        before: Original positions of the corners of the remaining triangles [m], shape (t, 3, 3).
+        now: Positions of their corners after mending [m], shape (t, 3, 3).
+        rows: Indices of the remaining triangles among the original ones, shape (t,).
     """
     corner = np.linalg.norm(now[:, :, None] - before[:, None], axis=3).argmin(axis=2)
     return SurfacePaint(paint.corner_uv[rows[:, None], corner], paint.image[rows], paint.images)

@@ -1,4 +1,4 @@
-"""An object cut across into pieces, which bonds may hold together (B §3.2, R101, R102)."""
+"""Cutting of an object into slices, which bonds may hold together (B §3.2, R101, R102)."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from warpjld.grasp.validation import mend
 __all__ = ["cut_object", "longest_axis"]
 
 _SLAB = {"box": (0, 1, 2), "cylinder": (1,)}
-"""Axes along which slices of a built-in shape are of its kind again."""
+"""Axes of built-in shapes along which a slice is a shape of the same kind."""
 
 
 def longest_axis(thing: GraspObject) -> int:
-    """The axis of its own frame along which an object is longest."""
+    """Index (0, 1, 2) of the axis of an object's own frame along which it is longest."""
     return int(np.argmax(np.round(thing.size, 9)))
 
 
 def cut_object(thing: GraspObject, count: int, axis: int) -> list[GraspObject]:
-    """An object in slices of one thickness, lowest first; all keep its frame and its place.
+    """Cut an object into slices of equal thickness, in ascending order; all keep its frame and placement.
 
     Args:
-        thing: The object; its surface is closed.
-        count: Of the slices, 2 or more.
-        axis: Of its own frame, which the cuts are square to.
+        thing: The object; its surface must be closed.
+        count: Count of slices, 2 or more.
+        axis: Axis of the object's own frame, normal to the cuts.
 
     Raises:
-        InputError: A surface that is not closed, or a slice with nothing in it.
+        InputError: The surface is not closed, or a slice is empty.
     """
     if count < 2:
         raise InputError(f"pieces: want 2 or more, got {count}")
     if not thing.report.watertight:
-        raise InputError(f"{thing.name} has an open surface: there is no inside to cut")
+        raise InputError(f"{thing.name} has an open surface: only closed ones can be cut")
     low, high = float(thing.vertices[:, axis].min()), float(thing.vertices[:, axis].max())
     ends = np.linspace(low, high, count + 1)
     out = []
@@ -59,7 +59,7 @@ def cut_object(thing: GraspObject, count: int, axis: int) -> list[GraspObject]:
 def _between(
     thing: GraspObject, axis: int, planes: Sequence[tuple[float, float]]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Vertices and triangles of what lies on one side of planes, closed where they cut."""
+    """Vertices and triangles of an object clipped by planes (height along the axis, sign of the kept side), capped."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(thing.vertices, thing.faces)

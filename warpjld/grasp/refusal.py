@@ -1,4 +1,4 @@
-"""Why a hand does not take an object: the unit of a file, the object, the hand, or none of them."""
+"""Diagnosis of a failed grasp search: the file's unit, the object, the hand, or none of them is the cause."""
 
 from __future__ import annotations
 
@@ -8,19 +8,23 @@ from warpjld.grasp.random_placements import Draws
 
 __all__ = ["fault_of", "refuse_what_is_too_wide"]
 
-_SLACK = 1.2  # times what thumb and fingers span: what is wider everywhere is not tried
-_FINGERTIP = 0.06  # of a hand's length: the breadth of a fingertip, below which pads find nothing to oppose on
-_USUAL = 0.19  # a hand's length where none is known [m]
+_SLACK = 1.2  # an object wider everywhere than this multiple of the widest opening of thumb and fingers is not tried
+_FINGERTIP = 0.06  # breadth of a fingertip over the hand's length; pads find no opposite sides on smaller objects
+_USUAL = 0.19  # length of a hand where it is unknown [m]
 
 
 def refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
-    """Nothing where some part of the object fits between thumb and fingers.
+    """Check that some part of the object fits between thumb and fingers.
+
+    Args:
+        draws: Random placements of the object.
+        friction: Coulomb coefficient.
 
     Raises:
-        InputError: None does, with the object's width and theirs.
+        InputError: No part does; states the object's least width and the widest opening.
     """
     thing, widest = draws.near.thing, draws.widest
-    if thing.size.min() <= _SLACK * widest:  # it costs to look closer, and next to none of these are
+    if thing.size.min() <= _SLACK * widest:  # skip the costly measurement of the least width; these are rarely too wide
         return
     narrowest = draws.narrowest(friction)
     if narrowest > _SLACK * widest:
@@ -33,10 +37,10 @@ def refuse_what_is_too_wide(draws: Draws, friction: float) -> None:
 
 
 def fault_of(draws: Draws, friction: float) -> str:
-    """What is at fault where no placement holds, and the sizes that say so.
+    """Describe the likely cause, with sizes, when no placement yields a grasp.
 
     Args:
-        draws: Placements of the first posture that was tried.
+        draws: Random placements for the first posture that was tried.
         friction: Coulomb coefficient.
 
     Examples:
@@ -56,7 +60,7 @@ def fault_of(draws: Draws, friction: float) -> str:
     if doubt := doubt_of_size(thing, length, None):
         return f"the unit is at fault, it seems: the object {doubt}"
     if narrowest >= most:
-        return f"the object is at fault: nowhere has it two opposite sides that this friction holds; {sizes}"
+        return f"the object is at fault: it has no two opposite sides that this friction could hold; {sizes}"
     sizes = f"the object is {1e3 * narrowest:.0f} mm wide where it is narrowest, {sizes}"
     if narrowest > widest:
         return f"the object is at fault: it is too wide for this hand; {sizes}"

@@ -213,7 +213,7 @@ def _together(sides: list[_Side], ended: list[_Ended], g: int, friction: float) 
 
 
 def _rank(verdict: Verdict) -> tuple[bool, float]:
-    """What closes: both palms before fingers alone, then the better score."""
+    """Rank of a grasp: both palms in contact before fingers alone, then by score."""
     return verdict.closed and verdict.palm, verdict.score
 
 

@@ -1,4 +1,4 @@
-"""Base colour texture of an OBJ file, by its material library."""
+"""Base colour texture of an OBJ file, found by its material library (MTL)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ __all__ = ["obj_texture"]
 
 
 def obj_texture(path: Path) -> tuple[bytes | None, str]:
-    """The picture that all of an OBJ file is painted with (``map_Kd``), and what is to be told about it.
+    """Encoded image of the single texture (``map_Kd``) of an OBJ file, and a warning.
 
-    Files with several pictures are drawn plain, and so are those whose material library or picture is not there.
+    The image is None if the file has several materials or if its material library or texture is missing. The warning is
+    empty if there is nothing to report.
     """
     libraries, used = [], set()
     with path.open(encoding="utf-8", errors="replace") as file:
@@ -37,7 +38,7 @@ def obj_texture(path: Path) -> tuple[bytes | None, str]:
 
 
 def _pictures(library: Path) -> dict[str, str]:
-    """Pictures of a library's materials, by name."""
+    """Texture file names of a library's materials, by material name."""
     out, name = {}, ""
     for line in read_bytes(library).decode("utf-8", errors="replace").splitlines():
         words = line.split()

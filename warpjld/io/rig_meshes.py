@@ -29,7 +29,7 @@ class RigMesh:
         corner_uv: Texture coordinates of the triangles' corners, if a vertex has several, shape (S, 3, 2), or None.
         polygons: Polygon that each triangle is part of, shape (S,), or None if all polygons are triangles.
         polygon_count: Number of polygons in the file, including those without triangles.
-        texture: Picture of its base colour, as its file holds it.
+        texture: Encoded image of its base colour texture, or None.
     """
 
     name: str

@@ -48,24 +48,24 @@ class Clip:
         return replace(self, positions=self.positions[frames], rotations=self.rotations[frames])
 
     def stating(self, *, rate: float | None = None, notes: tuple[str, ...], warnings: tuple[str, ...] = ()) -> Clip:
-        """The same frames, played at another rate where one is given, with other notes and warnings."""
+        """Copy with other notes and warnings, and with another frame rate if one is given."""
         return replace(self, rate=self.rate if rate is None else rate, notes=notes, warnings=warnings)
 
     def plain(self) -> Clip:
-        """The same frames as arrays."""
+        """Plain clip with all frames in memory."""
         return self
 
     def blocks(self) -> Iterator[Clip]:
-        """Blocks of frames, one after another, of which no more than one need be held."""
+        """Consecutive blocks of frames, so that only one needs to be in memory."""
         for start in range(0, len(self), BLOCK):
             yield self[start : start + BLOCK]
 
     def each(self, found: Callable[[Clip], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """What is found in blocks of frames, one below the other."""
+        """Apply a function to each block of frames and concatenate the results."""
         return np.concatenate([found(block) for block in self.blocks()])
 
     def mapped(self, changed: Callable[[Clip], Clip]) -> Clip:
-        """A clip of as many frames, each of which follows from that frame alone."""
+        """Clip with every frame mapped by a function that depends on that frame only."""
         return streamed_clip(len(self), lambda frames: changed(self[frames].plain()))
 
     def at_rate(self, rate: float) -> Clip:
@@ -125,15 +125,15 @@ class Clip:
 
 
 class StreamedClip(Clip):
-    """A clip whose frames are computed when they are looked at, a block at a time.
+    """Clip whose frames are computed on demand, one block at a time.
 
-    Slices of a block or less are plain clips, longer ones are streamed again. Whoever asks for the arrays themselves
+    Slices of at most one block are plain clips, longer ones are streamed clips. Whoever asks for the arrays themselves
     gets them whole.
 
     Args:
-        head: Any of its frames: what is not an array of frames.
+        head: Clip of any of its frames, which supplies everything but the frames.
         count: Number of frames.
-        made: A range of its frames; of each the same, whichever others are asked for.
+        made: Function that computes a range of frames; a frame must not depend on the range.
     """
 
     _blocks: HeldBlock[Clip]
@@ -152,7 +152,7 @@ class StreamedClip(Clip):
         return self._like(self._blocks[start:stop])
 
     def stating(self, *, rate: float | None = None, notes: tuple[str, ...], warnings: tuple[str, ...] = ()) -> Clip:
-        """As of a plain clip."""
+        """See :class:`Clip`."""
         head = self[:1].stating(rate=rate, notes=notes, warnings=warnings)
         return StreamedClip(head, len(self), self._blocks.part(0))
 
@@ -181,5 +181,5 @@ class StreamedClip(Clip):
 
 
 def streamed_clip(count: int, made: Callable[[slice], Clip]) -> Clip:
-    """A clip of F frames: made at once where they are a block or less, streamed where they are more."""
+    """Clip of F frames: plain if they fit in one block, otherwise streamed."""
     return made(slice(0, count)) if count <= BLOCK else StreamedClip(made(slice(0, 1)), count, made)

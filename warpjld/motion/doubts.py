@@ -47,7 +47,7 @@ def jumps(clip: Clip) -> list[str]:
 
 
 def _steps(clip: Clip) -> Iterator[NDArray[np.float64]]:
-    """Rotations [°] of all joints, relative to their parents, from one frame to the next, some frames at a time."""
+    """Rotations of all joints, relative to their parents, between consecutive frames [degrees], in blocks."""
     last = clip[:0].locals()
     for block in clip.blocks():
         turns = np.concatenate([last, block.locals()])
@@ -57,7 +57,7 @@ def _steps(clip: Clip) -> Iterator[NDArray[np.float64]]:
 
 
 def _first_steps(clip: Clip, joints: list[int], least: NDArray[np.float64]) -> list[int]:
-    """The first frame of each of some joints from which it turns by as much to the next."""
+    """First frame of each given joint from which its rotation to the next frame is the given one."""
     out = [-1] * len(joints)
     start = 0
     for steps in _steps(clip) if joints else ():

@@ -85,11 +85,11 @@ def _turn_flat_ones(
     """Replace singular transforms by the joint's previous rotation with a tiny scale, in place.
 
     Args:
-        worlds: Transforms of some frames, shape (f, N, 4, 4).
+        worlds: Transforms of a block of frames, shape (f, N, 4, 4).
         tree: The joints.
-        first: Number of the first of these frames.
-        before: Transforms of the frame before, shape (N, 4, 4).
-        told: Warnings by joint are added.
+        first: Number of the block's first frame.
+        before: Transforms of the frame before the block, shape (N, 4, 4).
+        told: Warnings by joint, to which new ones are added.
     """
     linear = worlds[..., :3, :3]
     flat = np.abs(np.linalg.det(linear)) <= _FLAT * np.abs(linear).max(axis=(-1, -2)) ** 3
@@ -98,5 +98,6 @@ def _turn_flat_ones(
         u, _, v = np.linalg.svd(last[:3, :3])
         linear[frame, joint] = _TINY * u @ v
         told.setdefault(
-            int(joint), f"joint '{tree.names[joint]}' is scaled to nothing at frame {first + frame}: not turned then"
+            int(joint),
+            f"joint '{tree.names[joint]}' is scaled to nothing at frame {first + frame}: its last rotation is kept",
         )

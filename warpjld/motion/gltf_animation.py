@@ -86,10 +86,10 @@ def read_gltf_animation(path: str | Path, *, rate: float | None = None, name: st
 
 
 def _frames(document: Document, keys: list[_Keys], rate: float | None) -> tuple[NDArray[np.float64], float]:
-    """Times of the frames [s], and frames a second."""
+    """Times of the frames [s], and frame rate [1/s]."""
     if not keys:
         raise InputError("its animation moves no joint", path=document.path)
-    distinct = {id(key.times): key.times for key in keys}  # mostly one: nodes that are keyed alike share their times
+    distinct = {id(key.times): key.times for key in keys}  # usually one: most nodes share their key times
     times = merged_times(np.concatenate(list(distinct.values())))
     rate = frame_rate(times) if rate is None else rate
     at = frame_times(times[0], times[-1], rate)
@@ -98,7 +98,7 @@ def _frames(document: Document, keys: list[_Keys], rate: float | None) -> tuple[
 
 
 def _check(document: Document, keys: list[_Keys], at: NDArray[np.float64]) -> list[str]:
-    """Warnings about scale that mirrors; InputError where a node is not finite."""
+    """Warnings about mirroring scale; InputError if a transform is not finite."""
     mirrored: dict[int, str] = {}
     for start in range(0, len(at), BLOCK):
         worlds, found = _worlds(document, keys, at[start : start + BLOCK])
@@ -125,7 +125,7 @@ class _Keys:
             known[sampler.input] = document.accessor(sampler.input).astype(np.float64).ravel()
         self.times = known[sampler.input]
         self.mode = sampler.interpolation or "LINEAR"
-        values = document.accessor(sampler.output)  # mostly float32: only what is looked at becomes float64
+        values = document.accessor(sampler.output)  # usually float32; converted to float64 only where used
         per_key = 3 if self.mode == "CUBICSPLINE" else 1
         where = f"animation of '{document.name(node)}', {path}"
         if self.mode not in ("LINEAR", "STEP", "CUBICSPLINE"):
@@ -227,7 +227,7 @@ def _worlds(
             if turned is not None:
                 held[node], mirrored[node] = turned
     order = _parents_first(document)
-    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused
+    with np.errstate(invalid="ignore", over="ignore"):  # values that are not finite are rejected later
         worlds = _compose(document, order, local)
         if held:
             for node, linear in held.items():

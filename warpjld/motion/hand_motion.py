@@ -22,7 +22,7 @@ class HandPart:
     """Rotations of a rig's J joints by one recorded hand, at k of its times.
 
     Attributes:
-        local: Rotations relative to the parent's bone, identity for joints of no hand, shape (k, J, 4).
+        local: Rotations relative to the parent's bone, identity for joints outside the hand, shape (k, J, 4).
         root: Rotation of the root of a rig that consists of this hand, shape (k, 4).
         displacement: Displacement [m] of such a rig's root from rest, shape (k, 3).
     """
@@ -39,7 +39,7 @@ class HandTurns:
     Attributes:
         joints: Joints of the rig that belong to the hand.
         moves: Whether the root's rotation and displacement are known.
-        part: The rotations at a range of the hand's times.
+        part: Function that computes the rotations at a range of the hand's times.
     """
 
     joints: tuple[int, ...]
@@ -47,7 +47,7 @@ class HandTurns:
     part: Callable[[slice], HandPart]
 
     def at(self, times: NDArray[np.float64], wanted: NDArray[np.float64]) -> HandPart:
-        """The rotations between the hand's times [s], shape (K,), at increasing ones; held before and after."""
+        """Rotations at increasing times, interpolated between the hand's times [s], shape (K,), constant outside."""
         last = int(np.searchsorted(times, wanted[-1], side="right")) + 1
         first = min(max(int(np.searchsorted(times, wanted[0], side="right")) - 1, 0), max(len(times) - 2, 0))
         span = slice(first, max(last, first + 2))

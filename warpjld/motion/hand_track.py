@@ -125,7 +125,7 @@ class HandTrack:
         return np.stack([self.points[name][times] for name in palm], axis=1)
 
     def _scale(self, palm: list[str], rest: NDArray[np.float64]) -> float:
-        """Size of the palm, on average over all times, relative to that at rest; InputError where it has no breadth."""
+        """Size of the palm, on average over all times, relative to rest; InputError if the breadth is 0."""
         sizes = []
         for first in range(0, len(self.times), BLOCK):
             places = self._places(palm, slice(first, first + BLOCK))
@@ -140,7 +140,7 @@ class HandTrack:
 
 
 def _fit(rest: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Least-squares rotations of the rest points onto the places (Kabsch)."""
+    """Least-squares rotations of the rest points onto the recorded positions (Kabsch)."""
     a = rest - rest.mean(axis=0)
     b = places - places.mean(axis=1, keepdims=True)
     u, _, vt = np.linalg.svd(np.einsum("fpi,pj->fij", b, a))

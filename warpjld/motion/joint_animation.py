@@ -57,11 +57,11 @@ class JointAnimation:
         return replace(self, worlds=self.worlds[frames])
 
     def plain(self) -> JointAnimation:
-        """The same frames as arrays."""
+        """Plain animation with all frames in memory."""
         return self
 
     def blocks(self) -> Iterator[tuple[int, JointAnimation]]:
-        """First frame and frames of blocks, one after another, of which no more than one need be held."""
+        """Consecutive blocks, each with the number of its first frame, so that only one needs to be in memory."""
         for start in range(0, len(self), BLOCK):
             yield start, self[start : start + BLOCK]
 
@@ -98,12 +98,12 @@ class JointAnimation:
 
 
 class StreamedAnimation(JointAnimation):
-    """An animation whose frames are computed when they are looked at, a block at a time, as of ``StreamedClip``.
+    """Animation whose frames are computed on demand, one block at a time, as in ``StreamedClip``.
 
     Args:
-        head: Any of its frames: what is not an array of frames.
+        head: Animation of any of its frames, which supplies everything but the frames.
         count: Number of frames.
-        made: A range of its frames.
+        made: Function that computes a range of frames.
     """
 
     _blocks: HeldBlock[JointAnimation]
@@ -122,7 +122,7 @@ class StreamedAnimation(JointAnimation):
         return self._blocks[start:stop]
 
     def plain(self) -> JointAnimation:
-        """All frames as arrays."""
+        """Plain animation with all its frames in memory."""
         return self._whole
 
     @cached_property
@@ -136,16 +136,16 @@ class StreamedAnimation(JointAnimation):
 
 
 def streamed_animation(count: int, made: Callable[[slice], JointAnimation]) -> JointAnimation:
-    """An animation of F frames: made at once where they are a block or less, streamed where they are more."""
+    """Animation of F frames: plain if they fit in one block, otherwise streamed."""
     return made(slice(0, count)) if count <= BLOCK else StreamedAnimation(made(slice(0, 1)), count, made)
 
 
 def spilled_animation(head: JointAnimation, rows: SpilledRows) -> JointAnimation:
-    """An animation whose transforms were read one block after another, each frame a row of N × 16 numbers.
+    """Animation from transforms that were read block by block, each frame a row of N × 16 numbers.
 
     Args:
-        head: What is not an array of frames.
-        rows: The frames.
+        head: Animation that supplies everything but the frames.
+        rows: Transforms of the frames.
     """
     shape = (-1, len(head.tree), 4, 4)
     return streamed_animation(len(rows), lambda frames: replace(head, worlds=rows[frames].reshape(shape)))

@@ -84,7 +84,7 @@ def mano_hands(
     frames = [{}] * count if not isinstance(fields, list) else [f if isinstance(f, Mapping) else {} for f in fields]
     listed = next((found[key] for key in _FRAMES if isinstance(found.get(key), list)), None)
     frames = [f if isinstance(f, Mapping) else {} for f in listed] if listed is not None else frames
-    # times and rates are no more than a row: as lists, the poses of a long recording would be most of the memory
+    # convert only rows of numbers to lists: as a list, the poses of a long recording would need most of the memory
     rows = {name: value for name, value in found.items() if not (isinstance(value, np.ndarray) and value.ndim > 1)}
     about = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in rows.items()}
     times, rate = stated_times(about, frames if len(frames) == count else [{}] * count, rate, notes)

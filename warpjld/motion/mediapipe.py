@@ -47,7 +47,7 @@ _NAMES = ("category_name", "categoryName", "label", "display_name", "displayName
 _CONFIDENCE = ("confidence", "confidences", "score", "scores", "visibility", "presence")
 _FRAMES = ("frames", "results", "data")
 _ALL_SURE = np.ones(_COUNT)
-"""Confidence of hands without one; many hands share it."""
+"""Confidence of hands without one; shared to save memory."""
 
 
 def is_mediapipe(content: Any) -> bool:
@@ -88,7 +88,7 @@ def mediapipe_hands(content: Any, rate: float | None = None) -> HandRecording:
 def _hands(
     about: Mapping[str, Any], frames: Sequence[Any], timed: Sequence[Mapping[str, Any]], rate: float | None
 ) -> HandRecording:
-    """Hands of frames, whose times stand in ``timed`` or ``about``."""
+    """Hands of frames, whose times are in ``timed`` or ``about``."""
     notes: list[str] = []
     times, rate = stated_times(about, timed, rate, notes)
     seen: list[list[SeenHand]] = []
@@ -146,11 +146,11 @@ def mediapipe_arrays(arrays: Mapping[str, NDArray[Any]], rate: float | None = No
 
 
 class _ArrayFrames(Sequence[Any]):
-    """Frames of arrays as JSON would hold them, each made when it is looked at: as objects they are ten times as large.
+    """Frames of arrays as JSON-like objects, created on demand, since as objects they take ten times the memory.
 
     Args:
         fields: Arrays (F, …) by name.
-        count: F.
+        count: Count F of frames.
     """
 
     def __init__(self, fields: Mapping[str, Any], count: int) -> None:

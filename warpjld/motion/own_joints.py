@@ -177,13 +177,13 @@ class _Widened:
         if rig.skin is not None:
             self._fleshy[:] = False
             self._fleshy[rig.skin.joints[rig.skin.weights > 0.01]] = True
-        self._off = np.zeros(count)  # largest change of scale, its frame, and the factor there
+        self._off = np.zeros(count)  # largest change of scale; its frame and scale follow
         self._at, self._factor = np.zeros(count, dtype=np.int64), np.ones(count)
         self._largest = np.zeros(count)
         self._as_parent = np.ones(count, dtype=bool)
 
     def see(self, first: int, stretch: NDArray[np.float64]) -> None:
-        """Take note of stretches (f, J, 3) from a frame on."""
+        """Record the scales (f, J, 3) of a block of frames that begins at a frame."""
         size = np.abs(stretch)
         off = np.abs(size - 1.0).max(axis=2) * self._fleshy
         frame = off.argmax(axis=0)
@@ -218,7 +218,7 @@ class _Merged:
         self._rig, self._source = rig, rig.source
         of_source = {source: j for j, source in enumerate(rig.sources) if source >= 0}
         self._over: dict[int, int] = {}  # joint of the file → joint of the skeleton that it is part of
-        self._bones: dict[int, NDArray[np.float64]] = {}  # direction of the segment, where one goes on from there
+        self._bones: dict[int, NDArray[np.float64]] = {}  # direction of the segment, if one begins there
         self._apart: dict[int, float] = {}
         for s, name in enumerate(rig.source.names):
             over = next((of_source[a] for a in rig.source.ancestors(s) if a in of_source), None)
@@ -230,7 +230,7 @@ class _Merged:
                 self._bones[s] = unit(rig.skeleton.rest[below] - (rig.placing @ rig.source.frames[s])[:3, 3])
 
     def see(self, worlds: NDArray[np.float64], turned: NDArray[np.float64]) -> None:
-        """Take note of the file's transforms (f, N, 4, 4) and of how the skeleton's joints turn (f, J, 3, 3)."""
+        """Record a block's file transforms (f, N, 4, 4) and rotations of the skeleton's joints (f, J, 3, 3)."""
         for s, over in self._over.items():
             own, _ = polar(_flesh(self._rig, worlds[:, [s]], np.array([s]))[:, 0, :3, :3])
             relative = transform.Rotation.from_matrix(np.swapaxes(turned[:, over], 1, 2) @ own)
@@ -253,6 +253,5 @@ class _Merged:
             return []
         shown = first_few([text for _, text in sorted(told, reverse=True)])
         return [
-            "the animation turns joints that are none of this skeleton, and what flesh they have does not follow: "
-            f"{shown}"
+            f"the animation rotates joints that are not part of this skeleton, and their flesh does not follow: {shown}"
         ]

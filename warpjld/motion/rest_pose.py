@@ -101,7 +101,7 @@ def _feet_behind(marks: Landmarks, clip: Clip) -> bool:
 
 
 def _forward(marks: Landmarks, places: NDArray[np.float64], toe: int, knee: int, ankle: int) -> NDArray[np.float64]:
-    """How far a foot points forwards, -1 to 1, shape (F,)."""
+    """Forward component of a foot's direction, -1 to 1, shape (F,)."""
     across = marks.across("hip", places)
     assert across is not None
     front = np.cross(unit(across), unit(places[:, knee] - places[:, ankle]))
@@ -109,7 +109,7 @@ def _forward(marks: Landmarks, places: NDArray[np.float64], toe: int, knee: int,
 
 
 def _ways_of_frames(marks: Landmarks, clip: Clip) -> NDArray[np.float64] | None:
-    """As ``_ways``, of all frames of a recording, shape (F, 3)."""
+    """``_ways`` of all frames of a recording, shape (F, 3)."""
     if _ways(marks, marks.rest) is None:
         return None
     return clip.each(lambda some: np.asarray(_ways(marks, some.positions)))
@@ -178,7 +178,7 @@ def _apart(clip: Clip, parent: int, child: int, bone: NDArray[np.float64]) -> ND
 
 
 def _most_like_standing(marks: Landmarks, clip: Clip, up: NDArray[np.float64]) -> int:
-    """First frame with nearly the best score."""
+    """First frame whose score is nearly the best one."""
     score = clip.each(lambda some: _stance(marks, some.positions, up))
     return int(np.argmax(score <= score.min() + _AS_GOOD))
 

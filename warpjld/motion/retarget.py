@@ -110,7 +110,7 @@ def retarget_and_tell(clip: Clip, skeleton: Skeleton) -> Retargeted:
 
 @dataclass(frozen=True, eq=False)
 class _Follow:
-    """How a rig follows a recording, frame by frame.
+    """Mapping from the frames of a recording to poses of a rig.
 
     Attributes:
         clip: The recording.
@@ -129,7 +129,7 @@ class _Follow:
 
     @cached_property
     def has_trunk(self) -> bool:
-        """Whether both have a trunk."""
+        """Whether both skeletons have a trunk."""
         return bool(self._trunk(self.clip[:1]))
 
     @cached_property
@@ -148,7 +148,7 @@ class _Follow:
         return _trunk(self.source, self.target, recorded)
 
     def poses(self, clip: Clip) -> Poses:
-        """Poses of some frames, with the rig's root at rest."""
+        """Poses at a block of frames, with the rig's root at rest."""
         skeleton, axes, trunk = self.skeleton, self.axes, self._trunk(clip)
         world = np.empty((len(clip), len(skeleton), 4))
         driven = {j: (name, b) for name, (j, b) in self.pairs.items()}
@@ -298,7 +298,7 @@ def _travel(follow: _Follow, scale: float) -> NDArray[np.float64]:
     start = follow.clip[:1].positions[0, bone]
 
     def found(clip: Clip) -> NDArray[np.float64]:
-        """Displacement, and height of the lowest joint then, shape (f, 4)."""
+        """Displacement, and height of the lowest joint after it [m], shape (f, 4)."""
         poses = follow.poses(clip)
         moved = scale * rotate(follow.axes, clip.positions[:, bone] - start)
         travel = target.rest[joint] - poses.positions[:, joint] + moved

@@ -28,7 +28,7 @@ class RequestGuard:
     Attributes:
         host: The address that the server listens on.
         token: Token that pages must send, in the address or as the cookie they then get; None: no token needed.
-        framed: Whether pages of this machine, such as notebooks, may show it in a frame.
+        framed: Whether pages of this machine, such as notebooks, may embed it in a frame.
     """
 
     host: str
@@ -39,11 +39,11 @@ class RequestGuard:
         """Reason to refuse a request for this path with these headers; None to accept it."""
         host = headers.get("Host", "")
         if not self._is_mine(host):
-            return "this server is not called so"
+            return "the host name in the request is not that of this server"
         origin = headers.get("Origin")
         upgrades = headers.get("Upgrade", "").lower() == "websocket"
         if upgrades and origin is None:
-            return "a connection says which page it is from"
+            return "a WebSocket connection needs an Origin header"
         if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
             return "only the studio's own page may connect"
         if self.token is not None and not self._knows(path, headers):
@@ -58,7 +58,7 @@ class RequestGuard:
 
     @property
     def ancestors(self) -> str:
-        """Pages that may show it inside them, as browsers are told."""
+        """Value of the CSP directive ``frame-ancestors``: pages that may embed the server's pages."""
         return "frame-ancestors 'self'" + (" http://localhost:* http://127.0.0.1:*" if self.framed else "")
 
     def _is_mine(self, host: str) -> bool:

@@ -59,7 +59,7 @@ def add_surface(
     wireframe: bool = False,
     opacity: float | None = None,
 ) -> Any:
-    """Add a surface of one colour; its ``vertices`` can be changed later. Only the outside of a closed one is drawn."""
+    """Add a surface of one colour; its ``vertices`` can be changed later. Back faces of closed ones are not drawn."""
     return server.scene.add_mesh_simple(
         name,
         vertices,
@@ -98,8 +98,10 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 
 def _light(server: Any) -> None:
-    """Light from all sides, one lamp over the shoulder and one for the palm, without shadows: what bends is seen, and
-    drawn fast. Every lamp more costs a browser without a graphics card a tenth of its frames."""
+    """Add ambient light and two lamps without shadows: one from above, and one from below that lights the palm.
+
+    Each further lamp lowers the frame rate of a browser without a graphics card by a tenth.
+    """
     scene = server.scene
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)

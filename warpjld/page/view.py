@@ -1,5 +1,4 @@
-"""Surfaces seen in a notebook: a page of this machine in the output of a cell, turned with the mouse, played by a
-slider."""
+"""Interactive 3D view of surfaces in a notebook: a local viser page in an iframe, with a frame slider."""
 
 from __future__ import annotations
 
@@ -18,19 +17,19 @@ from warpjld.page.server import add_colored, add_surface, guarded_server, look, 
 __all__ = ["SurfaceView", "ViewedSurface"]
 
 _HOST, _HEIGHT = "127.0.0.1", 480
-"""Where a view listens, and how high it stands in a notebook [pixels]."""
+"""Address that the server listens at, and height of the iframe [pixels]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ViewedSurface:
-    """One surface at a frame.
+    """One surface at one frame.
 
     Attributes:
-        name: The same at every frame.
-        vertices: [m], shape (V, 3).
+        name: Name, the same at every frame.
+        vertices: Positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        color: ``#rrggbb``, where its vertices have no colours of their own.
-        colors: Of the vertices, uint8, shape (V, 3).
+        color: Colour ``#rrggbb``, used if there are no vertex colours.
+        colors: Vertex colours, uint8, shape (V, 3); None if there are none.
     """
 
     name: str
@@ -41,20 +40,20 @@ class ViewedSurface:
 
 
 class SurfaceView:
-    """Frames of surfaces, each a list of them; shown by the notebook that it is the value of, until it is closed.
+    """View of an animation of surfaces; a notebook shows it if it is the value of a cell. Runs until closed.
 
-    Only pages of this machine may hold it, and nothing but itself may drive it.
+    Only pages served from this machine may embed it, and its server refuses connections from other pages.
 
     Args:
-        frames: What is seen at each.
-        numbers: Their numbers; 0, 1, … if left out.
-        rate: Frames a second when it plays.
+        frames: Surfaces of each frame.
+        numbers: Frame numbers; 0, 1, … by default.
+        rate: Playback rate [frames/s].
 
     Attributes:
-        address: What to open in a browser of this machine.
+        address: URL of the page, reachable from this machine only.
 
     Raises:
-        InputError: There is no frame.
+        InputError: No frame, or no surface in the first one.
         MissingExtraError: viser is not installed.
     """
 
@@ -62,7 +61,7 @@ class SurfaceView:
         self, frames: Sequence[Sequence[ViewedSurface]], *, numbers: Sequence[float] | None = None, rate: float = 25.0
     ) -> None:
         if not frames or not frames[0]:
-            raise InputError("a view wants at least one frame with a surface")
+            raise InputError("a view needs at least one frame with a surface")
         self._frames, self._rate = frames, rate
         self._numbers = [float(k) for k in range(len(frames))] if numbers is None else [*map(float, numbers)]
         self._meshes: dict[str, Any] = {}
@@ -72,37 +71,37 @@ class SurfaceView:
         if len(frames) > 1:
             self._add_controls()
         self.draw(0)
-        look(self._server, np.concatenate([one.vertices for one in frames[0]]))
+        look(self._server, np.concatenate([surface.vertices for surface in frames[0]]))
 
     def __repr__(self) -> str:
         return f"SurfaceView({len(self._frames)} frames, {self.address})"
 
     def _repr_html_(self) -> str:
-        """What notebooks show."""
+        """HTML that notebooks display: an iframe with the page."""
         return f'<iframe src="{self.address}" width="100%" height="{_HEIGHT}" style="border:0"></iframe>'
 
     def draw(self, place: int) -> None:
-        """Show the frame of that place."""
+        """Show the frame at this index of ``frames``."""
         with self._lock, self._server.atomic():
             shown = self._frames[place]
-            for name in {*self._meshes} - {one.name for one in shown}:
+            for name in {*self._meshes} - {surface.name for surface in shown}:
                 self._meshes.pop(name).remove()
-            for one in shown:
-                self._draw(one)
+            for surface in shown:
+                self._draw(surface)
 
     def close(self) -> None:
-        """End it."""
+        """Stop playback and the server."""
         self._closed.set()
         stop(self._server)
 
-    def _draw(self, one: ViewedSurface) -> None:
-        places, name = np.asarray(one.vertices, np.float32), f"/{one.name}"
-        if one.colors is not None:
-            self._meshes[one.name] = add_colored(self._server, name, places, one.faces, one.colors)
-        elif one.name in self._meshes:
-            self._meshes[one.name].vertices = places
+    def _draw(self, surface: ViewedSurface) -> None:
+        vertices, name = np.asarray(surface.vertices, np.float32), f"/{surface.name}"
+        if surface.colors is not None:
+            self._meshes[surface.name] = add_colored(self._server, name, vertices, surface.faces, surface.colors)
+        elif surface.name in self._meshes:
+            self._meshes[surface.name].vertices = vertices
         else:
-            self._meshes[one.name] = add_surface(self._server, name, places, one.faces, one.color)
+            self._meshes[surface.name] = add_surface(self._server, name, vertices, surface.faces, surface.color)
 
     def _add_controls(self) -> None:
         gui = self._server.gui
@@ -110,12 +109,12 @@ class SurfaceView:
         self._place = gui.add_slider("Frame", min=0, max=last, step=1, initial_value=0, hint=self._hint())
         self._play = gui.add_checkbox("Play", False)
         self._place.on_update(lambda _: self.draw(int(self._place.value)))
-        threading.Thread(target=self._run, name="view-play", daemon=True).start()
+        threading.Thread(target=self._playback, name="view-play", daemon=True).start()
 
     def _hint(self) -> str:
         return f"frames {self._numbers[0]:g} to {self._numbers[-1]:g}"
 
-    def _run(self) -> None:
+    def _playback(self) -> None:
         while not self._closed.wait(1.0 / self._rate):
             if self._play.value:
                 place = (int(self._place.value) + 1) % len(self._frames)

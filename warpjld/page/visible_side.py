@@ -1,4 +1,4 @@
-"""Which side of a surface is ever seen: of a closed one the outside, and what is not drawn costs nothing."""
+"""Back-face culling: whether only the front faces of a surface need to be drawn."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ __all__ = ["visible_side"]
 
 
 def visible_side(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> Literal["front", "double"]:
-    """``front`` of a closed surface whose triangles (T, 3) are all wound outwards, else ``double``.
+    """``front`` for a closed, consistently oriented surface with triangles (T, 3) wound outwards, else ``double``.
 
-    Browsers that draw in software spend a third of their time on the backs of a hand's triangles.
+    Browsers with software rendering spend a third of their time on the back faces of a hand.
     """
     if not len(faces):
         return "double"
-    ways = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    count = int(ways.max()) + 1
-    there, back = ways[:, 0] * count + ways[:, 1], ways[:, 1] * count + ways[:, 0]
-    once = np.unique(there)
-    if len(once) != len(there) or not np.array_equal(once, np.sort(back)):
+    half_edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    count = int(half_edges.max()) + 1
+    keys, opposite = half_edges[:, 0] * count + half_edges[:, 1], half_edges[:, 1] * count + half_edges[:, 0]
+    unique = np.unique(keys)
+    if len(unique) != len(keys) or not np.array_equal(unique, np.sort(opposite)):
         return "double"
     a, b, c = (vertices[faces[:, k]].astype(np.float64) - vertices.mean(axis=0) for k in range(3))
     return "front" if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else "double"

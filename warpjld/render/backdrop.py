@@ -1,4 +1,4 @@
-"""Pictures behind everything that is drawn (R135)."""
+"""Background pictures of rendered views (R135)."""
 
 from __future__ import annotations
 
@@ -14,28 +14,40 @@ __all__ = ["before_picture", "check_backdrop"]
 
 
 def before_picture(drawn: NDArray[np.uint8], empty: NDArray[np.bool_], path: Path) -> NDArray[np.uint8]:
-    """What is drawn, uint8 (height, width, 3), before a picture that fills the view where ``empty``."""
+    """Composite a rendered view over a background picture.
+
+    Args:
+        drawn: Rendered view, uint8 (height, width, 3 or more).
+        empty: Mask of the pixels that show the background, shape (height, width).
+        path: Picture file; it is scaled and cropped to the size of the view.
+
+    Returns:
+        The composite, uint8 (height, width, 3).
+
+    Raises:
+        InputError: The picture cannot be read.
+    """
     height, width = drawn.shape[:2]
-    return np.where(empty[..., None], _filling(path, _written(path), width, height), drawn[..., :3])
+    return np.where(empty[..., None], _fitted(path, _modified(path), width, height), drawn[..., :3])
 
 
 def check_backdrop(path: Path) -> None:
-    """Refuse what is no picture.
+    """Check that a file is a readable picture.
 
     Raises:
-        InputError: Names the file.
+        InputError: It is missing or not a picture; names the file.
     """
-    _filling(path, _written(path), 16, 16)
+    _fitted(path, _modified(path), 16, 16)
 
 
-def _written(path: Path) -> int:
-    """When a file was written last [ns], 0 where it is not there."""
+def _modified(path: Path) -> int:
+    """Time at which a file was last modified [ns], 0 if it does not exist."""
     return path.stat().st_mtime_ns if path.exists() else 0
 
 
 @lru_cache(maxsize=4)
-def _filling(path: Path, written: int, width: int, height: int) -> NDArray[np.uint8]:
-    """A picture, as it was written at some time, cut to a size's proportions around its middle, in that size."""
+def _fitted(path: Path, written: int, width: int, height: int) -> NDArray[np.uint8]:
+    """Picture scaled and centre-cropped to a size; ``written`` makes the cache notice when the file changes."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:

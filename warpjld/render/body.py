@@ -67,7 +67,7 @@ class RenderedBody:
         actor.prop.interpolation = "Phong"
 
     def show_textured(self, plotter: Any, texture: MeshTexture, **look: Any) -> None:
-        """Add it with a picture on it."""
+        """Add the surface with a texture."""
         import pyvista
 
         keyed = np.column_stack([self._shading.faces.ravel(), texture.corner_uv.reshape(-1, 2)])

@@ -47,7 +47,7 @@ class Solid:
         faces: Triangles, shape (t, 3).
         color: Name or ``#rrggbb``, see `as_hex`.
         opacity: 0…1.
-        texture: Picture on it instead of the colour.
+        texture: Texture, which replaces the colour.
     """
 
     vertices: ArrayLike
@@ -73,7 +73,7 @@ class SceneRenderer:
         solids: Other objects.
         scale: Colours for the values that come with each frame.
         colors: Colours of the vertices instead of the style's, uint8 (V, 3).
-        texture: Picture on the surface instead of colours.
+        texture: Texture of the surface, which replaces colours.
         lamps: On the stage, instead of studio light.
         style: Colours.
         quality: Effort.

@@ -52,7 +52,7 @@ class Style:
         joint: Its joints.
         ink: Captions.
         colormap: Name of a Matplotlib colour map for values.
-        picture: File of a picture behind everything, which fills the view; None for the background's colours.
+        picture: File of a background picture, which fills the view; None for the background's colours.
     """
 
     skin: str = "#f0bda4"

@@ -1,4 +1,4 @@
-"""One picture for a mesh that several textures and plain colours cover (an atlas), with coordinates of its corners."""
+"""Texture atlas: one texture for a mesh with several textures and plain colours, and its texture coordinates."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from warpjld.geometry.paint import SurfacePaint
 __all__ = ["MeshTexture", "texture_atlas"]
 
 _LARGEST = 2048
-"""Pixels of a texture's longer side in the atlas: larger ones are made smaller."""
+"""Maximum width and height of a texture in the atlas [pixels]; larger ones are scaled down."""
 _PLAIN = 8
-"""Pixels of a tile of one colour."""
+"""Width and height of a tile of a plain colour [pixels]."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshTexture:
-    """A picture on a mesh of T triangles.
+    """Texture of a mesh of T triangles.
 
     Attributes:
-        image: uint8 (height, width, 3).
-        corner_uv: Coordinates of the triangles' corners, origin at the lower left, shape (T, 3, 2).
+        image: RGB image, uint8 (height, width, 3).
+        corner_uv: Texture coordinates of the triangles' corners, origin at the lower left, shape (T, 3, 2).
     """
 
     image: NDArray[np.uint8]
@@ -36,16 +36,16 @@ class MeshTexture:
 def texture_atlas(
     covers: Sequence[tuple[SurfacePaint | None, int, tuple[int, int, int]]], names: str = "it"
 ) -> MeshTexture | None:
-    """The textures of meshes that are drawn as one; None where none has any.
+    """Pack the textures of meshes that are drawn as one into an atlas; None if no mesh has a texture.
 
-    Coordinates outside of 0…1 repeat the picture, whole triangles at a time.
+    Coordinates outside 0…1 are wrapped per triangle, by the integer part of the triangle's mean, and then clamped.
 
     Args:
-        covers: Of every mesh its paint, its number of triangles, and its colour where it has no paint.
-        names: What they are called, for messages.
+        covers: For each mesh its textures (None: none), its count of triangles, and the colour of untextured triangles.
+        names: Name of the meshes, for messages.
 
     Raises:
-        InputError: A picture that cannot be read.
+        InputError: A texture cannot be read.
     """
     if all(paint is None for paint, _, _ in covers):
         return None
@@ -69,14 +69,14 @@ def texture_atlas(
 
 
 def _packed(tiles: Sequence[NDArray[np.uint8]], uv: NDArray[np.float64], tile: NDArray[np.int64]) -> MeshTexture:
-    """Tiles side by side, and coordinates (T, 3, 2) within them as coordinates within all."""
-    sizes = np.array([one.shape[:2] for one in tiles])
+    """Atlas of tiles side by side; ``uv`` (T, 3, 2) are coordinates within the tiles with indices ``tile`` (T,)."""
+    sizes = np.array([picture.shape[:2] for picture in tiles])
     starts = np.concatenate([[0], np.cumsum(sizes[:, 1])])
     height, width = int(sizes[:, 0].max()), int(starts[-1])
     image = np.zeros((height, width, 3), np.uint8)
-    for one, start in zip(tiles, starts, strict=False):
-        image[height - one.shape[0] :, start : start + one.shape[1]] = one
-    # half a pixel from a tile's border, so that its neighbour does not shine in
+    for picture, start in zip(tiles, starts, strict=False):
+        image[height - picture.shape[0] :, start : start + picture.shape[1]] = picture
+    # stay half a pixel inside a tile: interpolation must not blend in its neighbour
     share = 0.5 + (uv - 0.5) * (1.0 - 1.0 / sizes[tile][:, None, ::-1])
     across = (starts[tile][:, None] + share[..., 0] * sizes[tile, 1][:, None]) / width
     up = share[..., 1] * sizes[tile, 0][:, None] / height

@@ -1,7 +1,7 @@
-"""Warp's kernel cache looked at before anything of it is run: what is damaged there is native code.
+"""Integrity check of Warp's kernel cache: damaged native code must not be run.
 
-Beside the objects of every module lie their checksums, taken when they are first seen whole. A file that is not what it
-was then, or is cut off, is thrown away with its module's folder, and compiled anew when it is wanted.
+Checksums of a module's files are stored next to them when they are first found intact. If a file has changed since, or
+is truncated, the folder of its module is removed, and the module is compiled again when needed.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ __all__ = ["remove_damaged_kernels"]
 
 _SUMS = "warpjld.sums.json"
 _MODULE = re.compile(r"wp_warpjld_kernels\..+_[0-9a-f]+")
-"""Folders of our modules; those that are being compiled have longer names."""
+"""Names of folders of this package's modules; modules being compiled have longer ones."""
 _LOADED = (".o", ".ptx", ".cubin", ".meta")
 
 
 def remove_damaged_kernels(cache: Path) -> tuple[list[str], bool]:
-    """Look at the kernels of warpjld in a cache, note the checksums of those that are new, and remove what is damaged.
+    """Check the kernels of warpjld in a cache: store checksums of new modules, and remove damaged ones.
 
     Returns:
-        Names of the modules that were damaged, and whether all of them are gone now.
+        Names of the damaged modules, and whether all of them were removed.
     """
     found, gone = [], True
-    with suppress(OSError):  # a cache that cannot be listed holds nothing for us
+    with suppress(OSError):  # a cache that cannot be listed is treated as empty
         for folder in sorted(place for place in cache.iterdir() if _MODULE.fullmatch(place.name)):
             if _is_whole(folder):
                 continue
@@ -43,7 +43,7 @@ def remove_damaged_kernels(cache: Path) -> tuple[list[str], bool]:
 
 
 def _is_whole(folder: Path) -> bool:
-    """Whether all that would be loaded from a module's folder is what it was when it was first seen."""
+    """Whether all files that would be loaded from a module's folder match their checksums."""
     known = _known(folder)
     sums = {}
     try:
@@ -74,7 +74,7 @@ def _known(folder: Path) -> dict[str, str]:
 
 
 def _is_sound(suffix: str, content: bytes) -> bool:
-    """Whether a file looks like what it is to be, and is not cut off, as far as that can be told."""
+    """Whether a file is of the expected type and not truncated, as far as that can be checked."""
     if suffix == ".meta":
         try:
             return isinstance(json.loads(content), dict)

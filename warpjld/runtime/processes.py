@@ -56,13 +56,13 @@ class Work(Protocol[Job]):
 
 @runtime_checkable
 class BlockWork(Work[Each], Protocol[Each]):
-    """Jobs that are sooner done several at a time, with the same results."""
+    """Jobs that are faster in blocks, with the same results."""
 
     def blocks(self, jobs: Iterable[Each], processes: int) -> Iterable[list[Each]]:
-        """Jobs as they are handed out together."""
+        """Divide jobs into blocks, each of which is given to one worker."""
 
     def do_block(self, jobs: list[Each]) -> list[str]:
-        """Do jobs one after another, and keep what comes of each; returns their statuses."""
+        """Do the jobs of a block in a worker and store their results; returns their statuses."""
 
 
 def run_jobs(work: Work[Job], jobs: Iterable[Job], *, processes: int, done: Callable[[Job, str], None]) -> None:

@@ -40,8 +40,10 @@ def silence_warp() -> None:
 
 
 def _initialised() -> list[str]:
-    """Start Warp; where its kernel cache is damaged or cannot be written, without what is damaged or with a cache of
-    this process alone, which is told."""
+    """Initialise Warp; returns messages about its kernel cache.
+
+    Damaged kernels are removed from the cache; if it cannot be written, a temporary one of this process is used.
+    """
     import warp
 
     try:
@@ -57,9 +59,9 @@ def _initialised() -> list[str]:
 
 
 def _checked(cache: Path) -> list[str]:
-    """Look at a cache's kernels, now and when the process ends; lines to tell."""
+    """Check a cache's kernels, now and when the process ends; returns messages."""
     damaged, gone = remove_damaged_kernels(cache)
-    atexit.register(remove_damaged_kernels, cache)  # notes what was compiled meanwhile
+    atexit.register(remove_damaged_kernels, cache)  # stores checksums of newly compiled modules
     if not damaged:
         return []
     if not gone:
@@ -68,7 +70,7 @@ def _checked(cache: Path) -> list[str]:
 
 
 def _move_cache() -> None:
-    """Let Warp keep its kernels in a folder of this process and those that it starts."""
+    """Use a temporary kernel cache for this process and its child processes."""
     import warp
 
     folder = tempfile.mkdtemp(prefix="warpjld-kernels-")

@@ -222,7 +222,7 @@ class Arguments:
         return value.text
 
     def next_word(self) -> str | None:
-        """The word or quoted text that comes next, which is not read; None where none does."""
+        """The next word or quoted text, without consuming it; None at the end."""
         value = self._peek()
         return value.text if isinstance(value, Word | Text) else None
 

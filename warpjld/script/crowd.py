@@ -222,7 +222,7 @@ class Crowd:
 
     @cached_property
     def texture(self) -> MeshTexture | None:
-        """Textures of all actors that were given no colour; None where there is none."""
+        """Texture atlas of all actors without a colour of their own; None if none has a texture."""
         from PIL import ImageColor
 
         from warpjld.render.texture import texture_atlas

@@ -31,7 +31,7 @@ SHIPPED = (
 
 
 _MOST = 1e6
-"""Degrees, either way, that an angle may have: more is a mistake."""
+"""Largest accepted magnitude of an angle [degrees]."""
 
 
 def hand_channels(actor: Actor, side: str) -> dict[str, tuple[float, float]]:

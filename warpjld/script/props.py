@@ -43,7 +43,7 @@ class Prop:
         shapes: Key-framed shapes, where it has them.
         barred: Keys of Barr's deformations (taper, twist, bend), where it has them.
         assumed: Unit that was assumed for its file because the script states none.
-        colored: Whether the script gave it a colour, which replaces the texture of its file.
+        colored: Whether the script sets a colour, which replaces the texture of the file.
     """
 
     name: str
@@ -114,7 +114,7 @@ def prop_places(actors: Mapping[str, Actor], rate: float, prop: Prop, frames: ND
 
 
 def texture_of(prop: Prop) -> MeshTexture | None:
-    """The texture of an object's file, unless it was given a colour."""
+    """Texture of an object's file; None if the script sets a colour."""
     from PIL import ImageColor
 
     from warpjld.render.texture import texture_atlas

@@ -125,7 +125,7 @@ class Scene:
         size: Width and height of pictures and films [pixels].
         lamps: Lamps by name; none: default lighting.
         backdrop: Background colours, below and above; None: default.
-        backdrop_picture: Picture file as background instead.
+        backdrop_picture: Picture file that replaces the background colours; None without one.
         shots: Shots by name.
         outputs: Files to make, relative to the output folder.
         asked: Position in a script of the command that added each output, by the output's name.

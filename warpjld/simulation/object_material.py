@@ -38,7 +38,7 @@ class ObjectMaterial:
         made_of: Name in the catalogue of materials, if it is from there; determines its friction coefficients.
         prestress: Initial Cauchy stress in the object's axes, xx yy zz xy yz zx [Pa] (R98); relaxes where the object
             is not constrained.
-        regions: Materials of regions of its volume file, by name; the others have the object's (R141).
+        regions: Materials of regions of its volume mesh file, by name; other regions have the object's (R141).
         where: Script location, for messages.
 
     Examples:
@@ -71,7 +71,7 @@ class ObjectMaterial:
             raise InputError("pressure: only a hollow object has an inside to put under pressure")
 
     def laws(self, name: str, regions: Sequence[str]) -> dict[str, Material]:
-        """Laws of the regions of its mesh, which are called ``name.region``, or ``name`` where there is only one."""
+        """Laws of the mesh's regions, keyed by ``name.region``, or by ``name`` if there is only one region."""
         own, material = dict(self.regions), self.material()
         if len(regions) < 2:
             return {name: own[regions[0]].material() if regions and regions[0] in own else material}

@@ -190,10 +190,10 @@ class Simulation:
         return tactile_readings(self.model, hands[0], self.solved.frames)
 
     def show(self) -> SurfaceView:
-        """The frames that were solved, in the colours of pressure, for a notebook to show (extra ``studio``).
+        """Interactive view of the solved frames, coloured by pressure, for notebooks (extra ``studio``).
 
         Raises:
-            InputError: None was solved.
+            InputError: No frame was solved.
             MissingExtraError: viser is not installed.
         """
         return view_of_frames(self.surfaces)

@@ -223,8 +223,10 @@ class _Run:
         return None
 
     def _as_searched(self, model: ContactModel, since: float, steps: list[float]) -> list[float]:
-        """Times of a step in which a grip closes, no farther apart than the search's own: friction's forces depend on
-        the length of steps, and the grip was chosen by those of short ones."""
+        """Load steps of a frame in which a grip closes, refined to be no longer than those of the grip search.
+
+        Friction forces depend on the step length, and the grip was chosen with short steps.
+        """
         closing = [one.request for one in self.grips if one.edits]
         if all(one.last <= model.start + since or one.first > model.start + since for one in closing):
             return steps

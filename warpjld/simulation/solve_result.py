@@ -49,7 +49,7 @@ class SolveResult:
         edits: Joint flexions set by grip searches, corrections and force limits, in order.
         grips: Results of the grip searches.
         corrected: Digits that corrections opened.
-        uncorrected: Digits that corrections could not help, in words.
+        uncorrected: Messages about digits that corrections could not help.
         stops: Digits that stopped at their force limit.
         tight: Frame and smallest clearance between bone and object, by actor, digit and object.
         equilibria: Equilibrium of each frame that this run solved, by frame number, for differentiation.

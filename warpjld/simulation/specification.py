@@ -45,8 +45,8 @@ class FleshMaterial:
         digits: Digits whose flesh is meshed, as ``index``, or ``palm``; empty for the whole hand. The thumb includes
             its ball (thenar).
         segments: Segments of a body whose flesh is meshed, as ``left.forearm`` (see ``segment_joints``).
-        flexion: Whether bending alone deforms it from the first frame on, before any contact (B §1).
-        bones: File with surfaces of its bones, in the units and axes of the rig's own file; None: round bones.
+        flexion: Whether flexion alone deforms the flesh from the first frame on, before any contact (B §1).
+        bones: File with surfaces of its bones, in the units and axes of the rig's own file; None: cylinders.
         element: Edge length of the elements [m].
         flesh: Young's modulus of the tissue between skin and bone [Pa]; default: subcutaneous tissue (Maeno 1998).
         skin: Young's modulus of the outermost layer of elements [Pa]; default: dermis (Maeno 1998).

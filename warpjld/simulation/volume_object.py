@@ -1,4 +1,4 @@
-"""Objects whose volume another program meshed, with regions that each have a law (B §3.2, §3.3, R141)."""
+"""Objects read from volume mesh files, with a constitutive law per region (B §3.2, §3.3, R141)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from warpjld.grasp.objects import GraspObject, VolumeCells, make_object
 __all__ = ["VOLUME_FILES", "load_volume_object", "meshed_cells", "pieces_by_region", "region_names"]
 
 VOLUME_FILES = (".vtu", ".vtk", ".msh", ".mesh", ".inp", ".xdmf", ".med")
-"""Files of volume meshes that objects are read from; what meshio reads."""
+"""Suffixes of volume mesh files that objects are read from, by meshio."""
 
 
 def load_volume_object(
@@ -30,18 +30,18 @@ def load_volume_object(
     scale: float = 1.0,
     centre: bool = False,
 ) -> GraspObject:
-    """An object with the volume mesh of a file; its surface is that of the mesh.
+    """Load an object from a volume mesh file; its surface is the boundary of the mesh.
 
     Args:
         path: File in a format that meshio reads.
-        name: For messages.
-        unit: Unit of the file's numbers.
-        up: The file's axis that points up; it is turned to Y.
-        scale: Times larger.
+        name: Name of the object.
+        unit: Length unit of the file.
+        up: Axis of the file that points up; it is rotated to Y.
+        scale: Factor by which coordinates are multiplied.
         centre: Put the origin at the centre of the bounding box instead of the file's own.
 
     Raises:
-        InputError: Unreadable, without volume elements, or with a surface that is none.
+        InputError: The file cannot be read, has no volume elements, or has inverted elements or an invalid surface.
     """
     mesh = read_volume_mesh(path, scale=UNITS[unit] * scale)
     nodes = mesh.nodes @ AXES_TO_Y[up].T
@@ -54,23 +54,25 @@ def load_volume_object(
 
 
 def region_names(thing: GraspObject) -> tuple[str, ...]:
-    """Names of the regions of an object's volume mesh; none where it has no such mesh."""
+    """Names of the regions of an object's volume mesh; empty if it has no volume mesh."""
     return () if thing.cells is None else thing.cells.region_names
 
 
 def meshed_cells(name: str, cells: VolumeCells) -> HexMesh:
-    """A volume mesh whose regions are called ``name.region``, or ``name`` where there is only one, and its outside
-    ``name``."""
+    """Hexahedral mesh of an object's cells.
+
+    Regions are named ``name.region``, or ``name`` if there is only one; the boundary faces are named ``name``.
+    """
     names = (name,) if len(cells.region_names) == 1 else tuple(f"{name}.{region}" for region in cells.region_names)
     mesh = HexMesh(cells.nodes, cells.elements, cells.regions, names)
     return replace(mesh, faces={name: mesh.boundary()})
 
 
 def pieces_by_region(thing: GraspObject) -> list[GraspObject]:
-    """Each region of an object's volume mesh as an object, in the frame and place of the whole.
+    """Split an object into one object per region of its volume mesh, in the same frame and placement.
 
     Raises:
-        InputError: It has no volume mesh, or one of a single region.
+        InputError: The object has no volume mesh, or its mesh has a single region.
     """
     cells = thing.cells
     if cells is None or len(cells.region_names) < 2:
@@ -86,9 +88,10 @@ def pieces_by_region(thing: GraspObject) -> list[GraspObject]:
 
 
 def _object(name: str, cells: VolumeCells, origin: str) -> GraspObject:
+    """Object with the boundary of a volume mesh as its surface."""
     mesh = HexMesh(cells.nodes, cells.elements, cells.regions, cells.region_names)
     if float(mesh.scaled_jacobian().min()) <= 0.0:
-        raise InputError("elements of the volume mesh are turned inside out, or have no volume")
+        raise InputError("the volume mesh has inverted elements, or elements without volume")
     quads = mesh.quads(mesh.boundary())
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     a, b, c = triangles.T

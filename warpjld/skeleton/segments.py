@@ -1,4 +1,4 @@
-"""Segments of a body by their names in anatomy: ``left.forearm``, ``right.thigh``, ``trunk`` (B §2.1)."""
+"""Anatomical names of body segments: ``left.forearm``, ``right.thigh``, ``trunk`` (B §2.1)."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ SEGMENT_JOINTS: dict[str, tuple[str, ...]] = {
     "neck": ("neck",),
     "head": ("head",),
 }
-"""Joints that a segment of a body begins at, without side and number."""
+"""Names of the joints at which the bones of each segment begin, without side and number."""
 
 
 def segment_joints(skeleton: Skeleton, name: str) -> list[int]:
-    """Joints that the bones of a named segment begin at.
+    """Indices of the joints at which the bones of a named segment begin.
 
     Args:
-        skeleton: Whose joints.
-        name: In anatomy's words, with its side or without for both; or a joint's name, for the one segment that begins
-            there.
+        skeleton: The skeleton.
+        name: Anatomical name, with a side, or without for both sides; or the name of a joint, for the segment that
+            begins there. Case is ignored.
 
     Raises:
-        InputError: The skeleton has no such segment; proposes one.
+        InputError: The skeleton has no such segment; suggests a similar name.
     """
     wanted = name.lower()
     side, _, word = wanted.rpartition(".")
@@ -45,14 +45,14 @@ def segment_joints(skeleton: Skeleton, name: str) -> list[int]:
     else:
         found = [joint for joint, known in enumerate(skeleton.names) if skeleton.children[joint] and known == wanted]
     if not found:
-        sides = [f"{one}.{word}" for one in ("left", "right") for word in SEGMENT_JOINTS]
+        sides = [f"{prefix}.{word}" for prefix in ("left", "right") for word in SEGMENT_JOINTS]
         more = did_you_mean(wanted, (*sides, *SEGMENT_JOINTS, *skeleton.names))
         raise InputError(f"there is no segment '{name}' in this skeleton{more}")
     return found
 
 
 def _segment_of(joint: str) -> str:
-    """Segment that begins at a joint, empty where anatomy has no word for it here."""
+    """Anatomical name of the segment that begins at a joint; empty if :data:`SEGMENT_JOINTS` has none."""
     words = joint.split(".")
     last = words[-1].rstrip("0123456789") if words[-1] not in ("knuckle2", "knuckle3") else words[-1]
     if any(word in DIGITS for word in words):

@@ -1,4 +1,4 @@
-"""Frames of any number that are computed when they are looked at, a block at a time: poses, and what they come of."""
+"""Sequences of frames, such as poses, that are computed on demand, one block at a time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from warpjld.skeleton.kinematics import Poses
 __all__ = ["BLOCK", "HeldBlock", "StreamedPoses", "blocks_of", "streamed", "streamed_rows"]
 
 BLOCK = 1024
-"""Frames that are computed at once: some megabytes for a body, and enough to make little of what each call costs."""
+"""Frames per block: some megabytes for a body, and enough to make the overhead of a call negligible."""
 
 
 class _Frames(Protocol):
@@ -26,11 +26,11 @@ _SomeFrames = TypeVar("_SomeFrames", bound=_Frames)
 
 
 class HeldBlock(Generic[_SomeFrames]):
-    """F frames of any kind, of which the block looked at last is held.
+    """F frames, computed in blocks, of which the last one is cached.
 
     Args:
-        count: F.
-        made: A range of the frames.
+        count: Count F of frames.
+        made: Function that computes a range of frames.
     """
 
     def __init__(self, count: int, made: Callable[[slice], _SomeFrames]) -> None:
@@ -42,7 +42,7 @@ class HeldBlock(Generic[_SomeFrames]):
         return self._count
 
     def __getitem__(self, frames: slice) -> _SomeFrames:
-        """A block or less, counted from 0."""
+        """A range of at most one block of frames, counted from 0."""
         start, stop, _ = frames.indices(self._count)
         stop = max(start, stop)
         if self._held is None or not self._held[0] <= start <= stop <= self._held[0] + len(self._held[1]):
@@ -52,7 +52,7 @@ class HeldBlock(Generic[_SomeFrames]):
         return held[start - first : stop - first]
 
     def part(self, start: int) -> Callable[[slice], _SomeFrames]:
-        """The same frames, counted from another one."""
+        """Function that computes a range of these frames, counted from frame ``start``."""
 
         def made(frames: slice) -> _SomeFrames:
             span = slice(start + frames.start, start + frames.stop)
@@ -62,14 +62,14 @@ class HeldBlock(Generic[_SomeFrames]):
 
 
 class StreamedPoses(Poses):
-    """Poses that are functions of the frame, of F frames.
+    """Poses of F frames, computed on demand by a function of the frame numbers.
 
-    Slices of a block or less are plain ``Poses``, longer ones are streamed again; only one block is held. Whoever asks
-    for the arrays themselves gets them whole.
+    Slices of at most one block are plain ``Poses``, longer ones are streamed; one block is cached. The array attributes
+    compute and keep all frames.
 
     Args:
         frames: Frame numbers, shape (F,).
-        posed: Poses of some of them; of each the same, whichever others are asked for.
+        posed: Function that computes the poses at some frames; a pose must not depend on the other frames given.
     """
 
     _frames: NDArray[np.float64]
@@ -116,12 +116,12 @@ class StreamedPoses(Poses):
 
 
 def streamed(frames: NDArray[np.float64], posed: Callable[[NDArray[np.float64]], Poses]) -> Poses:
-    """Poses of F frames: computed at once where they are a block or less, streamed where they are more."""
+    """Poses of F frames: computed at once if they fit in one block, otherwise streamed."""
     return posed(frames) if len(frames) <= BLOCK else StreamedPoses(frames, posed)
 
 
 def streamed_rows(count: int, made: Callable[[slice], Poses]) -> Poses:
-    """Poses of F frames of which any range can be made."""
+    """Poses of F frames, from a function that computes any range of them."""
 
     def posed(frames: NDArray[np.float64]) -> Poses:
         rows = frames.astype(np.int64)
@@ -135,6 +135,6 @@ def streamed_rows(count: int, made: Callable[[slice], Poses]) -> Poses:
 
 
 def blocks_of(poses: Poses) -> Iterator[tuple[int, Poses]]:
-    """First frame and poses of blocks, one after another, that no more than one of them is held."""
+    """Consecutive blocks of poses, each with the index of its first frame, so that only one is in memory."""
     for start in range(0, len(poses), BLOCK):
         yield start, poses[start : start + BLOCK]

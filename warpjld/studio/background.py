@@ -13,23 +13,23 @@ __all__ = ["Background", "JobProgress"]
 JobProgress = Callable[[str, int, int], None]
 
 _PATIENCE = 1.0
-"""How long cancelled work may go on without telling of its progress before it is interrupted where it is [s]."""
-_LOOK = 0.02  # how often it is looked whether it may be interrupted [s]
-_WHOLE = ("<frozen importlib", "/warp/", "\\warp\\")
-"""Files of code that is not interrupted: modules being imported, or kernels being built, would be left half done."""
+"""Time after cancellation before work that reports no progress is interrupted [s]."""
+_POLL = 0.02  # interval at which it is checked whether the thread may be interrupted [s]
+_UNINTERRUPTIBLE = ("<frozen importlib", "/warp/", "\\warp\\")
+"""Parts of file names of code that is not interrupted: imports of modules and builds of kernels must be completed."""
 
 
 class _CancelledError(BaseException):
-    """Raised in cancelled work; nothing that handles errors stops it."""
+    """Raised in cancelled work; a ``BaseException``, so that handlers of ``Exception`` do not catch it."""
 
 
 class Background:
-    """One piece of work at a time.
+    """Runs one background job at a time.
 
     Attributes:
-        running: What is being done; None where nothing is.
-        done: What part of it is done, from 0 to 1, of the step that it is at.
-        step: That step.
+        running: Name of the running job; None if there is none.
+        done: Completed fraction of the current step, 0…1.
+        step: Description of the current step.
     """
 
     def __init__(self, changed: Callable[[], None]) -> None:
@@ -45,8 +45,13 @@ class Background:
     def start(
         self, what: str, work: Callable[[JobProgress], object], ended: Callable[[object, BaseException | None], None]
     ) -> bool:
-        """Begin; False where something is being done already. ``ended`` gets the result, or what was raised, or
-        neither where it was cancelled."""
+        """Start a job; returns False if another one is running.
+
+        Args:
+            what: Name of the job.
+            work: Function that does the job; it is given a function to report progress.
+            ended: Called with the result and the exception; both are None if the job was cancelled.
+        """
         if self.running is not None:
             return False
         self._cancel.clear()
@@ -56,7 +61,7 @@ class Background:
         return True
 
     def cancel(self) -> None:
-        """End the work at the next step that it tells of, or where it is after a while, as Ctrl-C would."""
+        """Stop the job at its next progress report, or after a second wherever it is, like Ctrl-C."""
         self._cancel.set()
         timer = threading.Timer(_PATIENCE, self._interrupt, (self._thread,))
         timer.daemon = True
@@ -75,7 +80,7 @@ class Background:
         except _CancelledError:
             self._leave()
             result = None
-        except BaseException as raised:  # it is shown, whatever it is
+        except BaseException as raised:  # all exceptions are passed on to be shown
             error = raised
         self.running, self.done, self.step = None, 0.0, ""
         ended(result, error)
@@ -87,35 +92,35 @@ class Background:
         self._changed()
 
     def _interrupt(self, thread: threading.Thread | None) -> None:
-        """Raise in the thread as soon as it is where that does no harm, if it still does the work."""
+        """Raise ``_CancelledError`` in the thread once it is interruptible, if it still runs the job."""
         while thread is not None:
             with self._guard:
                 if thread is not self._thread or not self._inside or not self._cancel.is_set():
                     return
-                if not _is_whole(thread):
+                if not _is_uninterruptible(thread):
                     _raise_in(thread, _CancelledError)
                     return
-            time.sleep(_LOOK)
+            time.sleep(_POLL)
 
     def _leave(self) -> None:
-        """Nothing is raised in this thread from now on."""
+        """End the interruptible part of this thread, and clear an exception that is pending."""
         with self._guard:
             self._inside = False
             _raise_in(threading.current_thread(), None)
 
 
-def _is_whole(thread: threading.Thread) -> bool:
-    """Whether a thread runs code that has to come to its end."""
+def _is_uninterruptible(thread: threading.Thread) -> bool:
+    """Whether a thread runs code that must be completed."""
     frame = sys._current_frames().get(thread.ident or 0)
     while frame is not None:
-        if any(part in frame.f_code.co_filename for part in _WHOLE):
+        if any(part in frame.f_code.co_filename for part in _UNINTERRUPTIBLE):
             return True
         frame = frame.f_back
     return False
 
 
 def _raise_in(thread: threading.Thread, error: type[BaseException] | None) -> None:
-    """Raise an error in a thread when it next runs Python; None takes back one that is not raised yet."""
+    """Schedule an exception in a thread, raised when it next runs Python code; None clears a pending one."""
     ctypes.pythonapi.PyThreadState_SetAsyncExc(
         ctypes.c_ulong(thread.ident or 0), None if error is None else ctypes.py_object(error)
     )

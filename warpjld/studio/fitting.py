@@ -1,4 +1,4 @@
-"""The covering's parameters fitted to an actor, beside the studio; they become a file of the script's folder."""
+"""Calibration of an actor's covering parameters as a background job; the result is a file in the script's folder."""
 
 from __future__ import annotations
 
@@ -17,17 +17,20 @@ __all__ = ["fit_skin"]
 def fit_skin(
     scene: Scene, name: str, path: Path, progress: JobProgress, poses: int | None = None
 ) -> tuple[float, float]:
-    """Fit, and write the parameter file; the loss before and after.
+    """Calibrate an actor's parameters and write them to a file.
 
     Args:
-        scene: With the actor.
-        name: The actor.
-        path: The file that ``PARAMETERS`` then reads.
-        progress: Told about the work.
-        poses: How many poses to fit to; all of the set by default.
+        scene: Scene with the actor.
+        name: Name of the actor.
+        path: Parameter file to write; the command ``PARAMETERS`` reads it.
+        progress: Receives progress reports.
+        poses: Number of calibration poses; by default the whole set.
+
+    Returns:
+        Loss before and after.
 
     Raises:
-        InputError: Nothing of the actor deforms, or the file cannot be written.
+        InputError: No part of the actor deforms, or the file cannot be written.
     """
     from warpjld.covering.calibrate import calibrate
     from warpjld.covering.parameters import save_parameters

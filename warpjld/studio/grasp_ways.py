@@ -1,4 +1,4 @@
-"""Ways to take an object, found beside the studio: each is a command of the script, with the scene that it leads to."""
+"""Search for alternative grasps of an object, one per posture, as a background job of the studio."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["GraspWay", "find_ways"]
 
 @dataclass(frozen=True, eq=False)
 class GraspWay:
-    """One way.
+    """One grasp that was found.
 
     Attributes:
-        line: The command.
-        text: The script with it.
-        outcome: What the search says of it.
-        performance: Of the script with it.
+        line: ``GRASP`` command with the posture.
+        text: The script with this line appended.
+        outcome: Result of the search.
+        performance: Run of the script with this line.
     """
 
     line: str
@@ -34,12 +34,12 @@ class GraspWay:
 
     @property
     def scene(self) -> Scene:
-        """The scene with it."""
+        """Scene after the command."""
         return self.performance.scene
 
     @property
     def title(self) -> str:
-        """Posture, score and what touches, in a line."""
+        """Posture, score and number of touching digits, as one line."""
         values = self.outcome.values
         return f"{values['posture']}: {values['score']:.3f} N, {len(values['digits'])} digits"
 
@@ -52,18 +52,18 @@ def find_ways(
     progress: JobProgress,
     found: Callable[[GraspWay], object] = lambda way: None,
 ) -> list[GraspWay]:
-    """Search with every posture; the best score first.
+    """Search for a grasp with every posture; returns those found, best score first.
 
     Args:
-        performance: Of the script as it is: each search goes on from a copy.
-        path: The script's file.
-        text: The script.
-        line: ``GRASP … AUTO``, without a posture.
-        progress: Told which posture is looked at.
-        found: Told of each way as it is found.
+        performance: Run of the current script; each search continues from a copy.
+        path: File of the script.
+        text: Text of the script.
+        line: Command ``GRASP … AUTO`` without a posture.
+        progress: Receives the posture being searched.
+        found: Called with each grasp as it is found.
 
     Raises:
-        InputError: No posture leads to a grasp; says why the last does not.
+        InputError: No posture leads to a grasp; the message is that of the last one.
     """
     ways: list[GraspWay] = []
     failure: InputError | None = None

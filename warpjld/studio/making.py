@@ -53,7 +53,7 @@ def pressed(
     text: str,
     scene: Scene,
     progress: JobProgress,
-    showing: Callable[[Pressed], None] = lambda so_far: None,
+    showing: Callable[[Pressed], None] = lambda pressed: None,
 ) -> Pressed:
     """Solve the contact that PRESS specifies; ``showing`` is called after each frame.
 
@@ -68,7 +68,7 @@ def pressed(
 
 
 def open_joints(state: StudioState, openings: Sequence[JointOpening]) -> bool:
-    """Open the joints that a verdict suggests, each at its frame; False where the script could not be changed."""
+    """Open the joints that a verdict suggests, each at its frame; returns False if the script could not be changed."""
     text, current = state.document.text, state.scene.current
     for one in openings:
         channel = f"{one.joint}.flexion"

@@ -37,7 +37,7 @@ def opened_document(path: Path | None, folder: Path, *, device: str = "cpu") -> 
 
 
 def readable(document: ScriptDocument) -> list[Path]:
-    """What a script may read: its folder, and the files that it names as it is opened."""
+    """Paths that a script may read: its folder, and the files it names when it is opened."""
     return [document.path.parent, *_named(document)]
 
 

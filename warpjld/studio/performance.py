@@ -16,14 +16,14 @@ from warpjld.script.statements import MacroDefinition, Node, Word
 
 __all__ = ["Performance"]
 
-_APART = 16  # statements that are run again at most, of those that take no time
-_LONG = 0.02  # seconds after which what a statement did is kept
-_REMEMBERED = 8  # searches whose outcomes are remembered while the script does not have them, as after UNDO
+_APART = 16  # largest number of quick statements between snapshots of the scene
+_LONG = 0.02  # duration of a statement after which a snapshot is taken [s]
+_REMEMBERED = 8  # results of grasp searches that are cached although the script lacks them, e.g. after UNDO
 
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """The scene before the statement of that number."""
+    """Snapshot of the scene before the statement with this number."""
 
     number: int
     moment: Moment
@@ -31,14 +31,14 @@ class _Kept:
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """The scene after some statements from the top, and the files that they read as they were."""
+    """Snapshot of the scene after the first statements of a script, with modification times of the files read."""
 
     nodes: tuple[Node, ...]
     moment: Moment
     files: dict[Path, int | None]
 
     def holds(self, nodes: tuple[Node, ...]) -> bool:
-        """Whether these statements begin so, and would read the same files."""
+        """Whether statements begin with those of the snapshot, and the files read are unchanged."""
         same = self.nodes == nodes[: len(self.nodes)]
         return same and all(_changed(path) == time for path, time in self.files.items())
 
@@ -67,7 +67,7 @@ class Performance:
 
     @property
     def scene(self) -> Scene:
-        """What the statements that ran describe."""
+        """Scene after the statements that have run."""
         return self._interpreter.scene
 
     @property
@@ -78,15 +78,15 @@ class Performance:
     def run(
         self, text: str, path: Path, progress: Callable[[str, int, int], None] = lambda what, done, total: None
     ) -> None:
-        """Make the scene that of this text, which stands in this file or will.
+        """Bring the scene to the state after this script; statements that ran already are not run again.
 
         Args:
-            text: The script.
-            path: Its file.
-            progress: Told, before each statement that runs, its command and how many are done of how many.
+            text: Text of the script.
+            path: File of the script; it need not exist yet.
+            progress: Called before each statement with its command, the count of statements done, and their total.
 
         Raises:
-            InputError: With line and column; ``scene`` is then that of the statements before.
+            InputError: A statement fails; names line and column. ``scene`` is then the state before this statement.
         """
         if path != self._path:
             self._path, self._parsed, self._text, self._done = path, (), "", ()
@@ -103,7 +103,7 @@ class Performance:
             try:
                 self._interpreter.execute((nodes[number],), path)
             except BaseException:
-                self._go_back(number, spoilt=True)  # what of it has happened is taken back
+                self._go_back(number, spoilt=True)  # undo its partial effects
                 raise
             self._done = nodes[: number + 1]
             spent = time.perf_counter() - began
@@ -113,10 +113,10 @@ class Performance:
                 self._learn(self._done, self._kept[-1].moment)
 
     def searches(self, text: str, path: Path) -> bool:
-        """Whether running this text would search for grasps: that takes long, and is better done by a ``beside``.
+        """Whether running this text would search for grasps, which takes long and should run in a copy (``beside``).
 
         Raises:
-            InputError: It cannot be parsed.
+            InputError: The text cannot be parsed.
         """
         nodes = self._nodes(text) if path == self._path else parse(text, str(path))
         known = max((len(one.nodes) for one in self._known if one.holds(nodes)), default=0)
@@ -125,7 +125,7 @@ class Performance:
         return any(_searches(node, macros) for node in nodes[max(alike, known) :])
 
     def beside(self) -> Performance:
-        """Another of the same text, which may run in another thread; ``learn`` takes over what it found."""
+        """Independent copy that may run in another thread; ``learn`` takes over its results."""
         other = Performance(self._folder, say=self._say, within=self._within)
         other._path, other._text, other._parsed, other._done = self._path, self._text, self._parsed, self._done
         other._kept, other._known = list(self._kept), deque(self._known, maxlen=_REMEMBERED)
@@ -133,19 +133,19 @@ class Performance:
         return other
 
     def learn(self, other: Performance) -> None:
-        """Know what statements came to that another ran: they need not run here."""
+        """Cache the state that another performance reached, so that its statements need not run here."""
         if other._done:
             self._learn(other._done, moment_of(other._interpreter))
 
     def copied(self) -> Scene:
-        """A scene like the one that is there, which nothing of what happens here changes."""
+        """Independent copy of the current scene."""
         return moment_of(self._interpreter).scene
 
     def _nodes(self, text: str) -> tuple[Node, ...]:
-        """The statements of a text; those before the first line that differs from the text before stay as they are."""
+        """Statements of a text; only those from the first line that differs from the previous text on are parsed."""
         old, new = self._text.split("\n"), text.split("\n")
         same = next((k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), min(len(old), len(new)))
-        # the last statement that begins before that line may go on in it
+        # the last statement that begins before this line may extend into it
         whole = max((k for k, node in enumerate(self._parsed) if node.name.position.line <= same), default=0)
         start = self._parsed[whole].name.position.line - 1 if whole else 0
         rest = parse("\n" * start + "\n".join(new[start:]), str(self._path))
@@ -153,7 +153,7 @@ class Performance:
         return self._parsed
 
     def _go_back(self, number: int, spoilt: bool = False) -> None:
-        """Make the scene what it was before the statement of that number."""
+        """Restore the scene before the statement with this number; ``spoilt``: even if that is the current state."""
         if number == len(self._done) and not spoilt:
             return
         while self._kept[-1].number > number:
@@ -169,7 +169,7 @@ class Performance:
         self._done = self._done[:number]
 
     def _go_on_from_known(self, nodes: tuple[Node, ...]) -> None:
-        """Make the scene what it is after the most statements that ran once already."""
+        """Continue from the cached snapshot that covers the most statements, if it covers more than are done."""
         for one in sorted(self._known, key=lambda one: -len(one.nodes)):
             if len(one.nodes) > len(self._done) and one.holds(nodes):
                 self._interpreter, self._done = one.moment.copy().resume(), one.nodes
@@ -184,18 +184,18 @@ class Performance:
             self._kept.append(_Kept(number, moment_of(self._interpreter)))
 
     def _begun(self) -> tuple[Interpreter, list[_Kept]]:
-        """An empty scene, and the moment before anything happens to it."""
+        """Interpreter of an empty scene, and the snapshot of this scene."""
         scene = Scene(folder=self._folder, say=self._tell, warn=self._tell, within=self._within)
         interpreter = Interpreter(scene)
         return interpreter, [_Kept(0, moment_of(interpreter))]
 
     def _tell(self, line: str) -> None:
-        if not self._quiet:  # what runs again has been said
+        if not self._quiet:  # repeated statements have written their messages before
             self._say(line)
 
 
 def _changed(path: Path) -> int | None:
-    """When a file was changed last [ns]; None where there is none."""
+    """Time at which a file was last modified [ns]; None if it does not exist."""
     try:
         return path.stat().st_mtime_ns
     except OSError:
@@ -203,13 +203,13 @@ def _changed(path: Path) -> int | None:
 
 
 def _alike(old: Sequence[Node], new: Sequence[Node]) -> int:
-    """How many statements are as they were."""
+    """Count of equal statements at the beginning of both scripts."""
     pairs = zip(old, new, strict=False)
     return next((k for k, (a, b) in enumerate(pairs) if a != b), min(len(old), len(new)))
 
 
 def _searches(node: Node, macros: Mapping[str, MacroDefinition], depth: int = 0) -> bool:
-    """Whether a statement, or one of the macro that it calls, is a search for a grasp."""
+    """Whether a statement, or one in the macro that it calls, is ``GRASP … AUTO``."""
     if isinstance(node, MacroDefinition) or depth > len(macros):
         return False
     name = node.name.text.upper()

@@ -1,4 +1,4 @@
-"""What a click on the stage points at: the joint that moves the skin there."""
+"""Picking: ray intersection with the drawn surfaces, and the joint that moves the skin at the hit vertex."""
 
 from __future__ import annotations
 
@@ -14,32 +14,35 @@ __all__ = ["digit_of", "first_hit", "joint_at"]
 
 
 def first_hit(shown: Sequence[Shown], origin: ArrayLike, direction: ArrayLike) -> tuple[Shown, int] | None:
-    """The surface that a ray meets first, and the vertex of it that is nearest to the place; None where it meets none.
+    """First surface that a ray hits, and the hit triangle's corner nearest to the hit point; None without a hit.
 
     Args:
         shown: Surfaces.
-        origin: Where the ray begins [m], shape (3,).
-        direction: Where it goes, shape (3,).
+        origin: Origin of the ray [m], shape (3,).
+        direction: Direction of the ray, of any length, shape (3,).
     """
     best: tuple[float, Shown, int] | None = None
-    for one in shown:
-        found = _hit(one, np.asarray(origin, np.float64), np.asarray(direction, np.float64))
+    for surface in shown:
+        found = _hit(surface, np.asarray(origin, np.float64), np.asarray(direction, np.float64))
         if found is not None and (best is None or found[0] < best[0]):
-            best = found[0], one, found[1]
+            best = found[0], surface, found[1]
     return None if best is None else best[1:]
 
 
 def joint_at(actor: Actor, vertex: int) -> str | None:
-    """Name of the joint that bends the skin at a vertex: where the bone begins whose domain it lies in most, or a joint
-    above that can move. None before anything is bound."""
+    """Name of the joint that moves the skin at a vertex; None if the actor is not bound yet.
+
+    It is the proximal joint of the nearest segment in the domain with the largest weight, or the nearest of its
+    ancestors that can move.
+    """
     covering = actor.covering
     if covering is None or vertex >= len(covering.domains):
         return None
     skeleton, place = actor.skeleton, covering.surface.vertices[vertex]
     segments = covering.fans[int(covering.domains[vertex].argmax())].segments
-    ends = [(skeleton.rest[one.proximal], skeleton.rest[one.distal]) for one in segments]
-    away = [_distance(place, *pair) for pair in ends]
-    joint = segments[int(np.argmin(away))].proximal
+    ends = [(skeleton.rest[segment.proximal], skeleton.rest[segment.distal]) for segment in segments]
+    distances = [_distance(place, *pair) for pair in ends]
+    joint = segments[int(np.argmin(distances))].proximal
     while joint >= 0:
         if (skeleton.limits[joint, :, 0] < skeleton.limits[joint, :, 1]).any():
             return skeleton.names[joint]
@@ -48,14 +51,14 @@ def joint_at(actor: Actor, vertex: int) -> str | None:
 
 
 def digit_of(joint: str) -> str | None:
-    """The digit that a joint belongs to, ``index``; None where it is of none."""
+    """Digit that a joint belongs to, such as ``index``; None if it belongs to none."""
     parts = joint.split(".")
     return parts[1] if len(parts) == 3 else None
 
 
-def _hit(one: Shown, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Distance to the first triangle (Möller and Trumbore), in lengths of the direction, and its nearest corner."""
-    corners = one.vertices.astype(np.float64)[one.faces]
+def _hit(surface: Shown, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int] | None:
+    """Ray parameter of the first hit (Möller and Trumbore), and the vertex nearest to it; None without a hit."""
+    corners = surface.vertices.astype(np.float64)[surface.faces]
     a, edge, other = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(direction, other)
     determinant = np.einsum("ij,ij->i", edge, across)
@@ -71,11 +74,11 @@ def _hit(one: Shown, origin: NDArray[np.float64], direction: NDArray[np.float64]
     face = int(np.argmin(np.where(inside, t, np.inf)))
     place = origin + t[face] * direction
     corner = int(np.linalg.norm(corners[face] - place, axis=1).argmin())
-    return float(t[face]), int(one.faces[face, corner])
+    return float(t[face]), int(surface.faces[face, corner])
 
 
 def _distance(place: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> float:
-    """From a point to a line between two others [m], shape (3,) each."""
+    """Distance of a point from a line segment [m]; points have shape (3,)."""
     along = end - start
     share = np.clip((place - start) @ along / max(float(along @ along), 1e-30), 0.0, 1.0)
     return float(np.linalg.norm(place - start - share * along))

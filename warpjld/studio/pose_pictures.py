@@ -1,4 +1,4 @@
-"""Small pictures of poses, side by side with their names."""
+"""Contact sheet of hand poses: a small labelled picture of each."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _COLUMNS = 4
 _VERTICES = 1500
 _SIDE: Literal["left"] = "left"
 _PALM, _FINGERS = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
-"""Of the hand that is shown, and where its palm and its fingers point."""
+"""Directions in which the palm and the fingers of the hand point."""
 
 
 def pose_sheet(poses: Mapping[str, Mapping[str, float]]) -> NDArray[np.uint8]:
-    """Poses of a hand as one picture, uint8 (height, width, 3): their names stand in each.
+    """Contact sheet of hand poses, labelled with their names, uint8 (height, width, 3).
 
     Args:
-        poses: By name, degrees by channel without a side, ``index.base.flexion``.
+        poses: Poses by name; angles [degrees] by channel name without a side, such as ``index.base.flexion``.
     """
     from PIL import Image, ImageDraw
 
@@ -57,7 +57,7 @@ def _covering() -> Covering:
 
 
 def _angles(covering: Covering, pose: Mapping[str, float]) -> NDArray[np.float64]:
-    """Angles [rad] of the hand in a pose, inside its limits, shape (J, 4)."""
+    """Joint angles of a pose, clamped to the limits [rad], shape (J, 4)."""
     skeleton = covering.skeleton
     out = skeleton.initial.copy()
     for channel, degrees in pose.items():

@@ -1,4 +1,4 @@
-"""Scripts that were open lately, kept in the user's cache folder."""
+"""List of recently opened scripts, stored in the user's cache folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MOST = 8
 
 
 def recent_scripts() -> list[Path]:
-    """Those that are still there, the last first; none where the list cannot be read."""
+    """Recent scripts that still exist, latest first; empty if the list cannot be read."""
     folder = kept_folder()
     if folder is None:
         return []
@@ -29,11 +29,11 @@ def recent_scripts() -> list[Path]:
 
 
 def note_recent(path: Path) -> None:
-    """A script was opened or saved; a folder that cannot be written is no fault."""
+    """Put a script at the head of the list; failure to write the list is ignored."""
     folder = kept_folder()
     if folder is None:
         return
-    names = [str(path.resolve()), *(str(one) for one in recent_scripts() if one != path.resolve())]
+    names = [str(path.resolve()), *(str(other) for other in recent_scripts() if other != path.resolve())]
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
         with whole_file(folder / _FILE) as part:

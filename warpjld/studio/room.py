@@ -38,10 +38,10 @@ LOCAL = "127.0.0.1"
 
 
 class Room:
-    """A studio that windows connect to; all of them show and change the same state.
+    """A studio that browser windows connect to; all of them show and edit the same state.
 
     Args:
-        state: What is shown and changed.
+        state: State shown and edited by the panels.
         host: Address to listen on. Any but this machine's own asks windows for a token.
         port: Port to listen on, or the next that is free; 0 for any.
 
@@ -65,16 +65,16 @@ class Room:
         self.post(lambda: None)
 
     def post(self, job: Callable[[], object], key: Hashable = None) -> None:
-        """Have something done to the state, and the panels refreshed."""
+        """Queue a job that may change the state; panels are refreshed afterwards."""
         self.worker.post(job, key)
 
     def by_hand(self, event: Any, job: Callable[[], object], key: Hashable = None) -> None:
-        """As ``post``, unless a control changed because a panel refreshed it."""
+        """``post`` a job for a control's event, unless it was caused by a panel's refresh."""
         if event.client_id is not None:
             self.post(job, key)
 
     def refresh(self) -> None:
-        """Show the state as it is."""
+        """Refresh all panels, and save the script's recovery file if it has changed."""
         for panel in self.panels:
             panel.refresh()
         if self.state.document.text != self._kept:
@@ -82,7 +82,7 @@ class Room:
             self._autosave()
 
     def stop(self) -> None:
-        """Keep what is not saved, and close."""
+        """Save unsaved changes to the recovery file, and stop the server."""
         self.worker.stop()
         self._autosave()
         stop(self.server)
@@ -92,7 +92,7 @@ class Room:
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.set_panel_label("warpjld studio")
         gui.main_panel.dock_right()
-        self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs: seen wherever one is
+        self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs, so always visible
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
             self.stage, ghosts, pose = StagePanel(self), GhostsPanel(self), PoseToolsPanel(self)
@@ -114,7 +114,7 @@ class Room:
         self.panels = [*posing, script, files, work, menus, timeline, curves, self.progress, messages]
 
     def _beside(self, text: str, then: Callable[[], object]) -> None:
-        """Run a text that searches for grasps in the background, and then go on."""
+        """Run a text with grasp searches in the background, and then call ``then``."""
         state = self.state
         performance, path = state.performance.beside(), state.document.path
 
@@ -133,7 +133,7 @@ class Room:
         self.progress.start("the search", work, told, failed)
 
     def _failed(self, error: BaseException) -> None:
-        """Show what a job raised: nothing is swallowed, and nothing ends the studio."""
+        """Show the exception of a job; the studio keeps running."""
         if isinstance(error, WarpjldError):
             self.state.error = error
         else:

@@ -37,14 +37,15 @@ class StudioState:
     Attributes:
         document: The script.
         frame: The frame that is shown.
-        error: What is wrong with the script or with the last command; None where nothing is.
+        error: Error of the script or of the last command; None without one.
         broken: Whether the script as it stands cannot be run.
         messages: What commands said last.
         coloring: What skin is coloured by.
-        joint: The joint that is selected, of the actor that sliders move.
+        joint: Selected joint of the actor that sliders move; None without a selection.
         solved: The contact that was solved last.
-        preview: A scene that is shown in place of the script's, as long as the script stays as it is.
-        defer: Has a text that searches for grasps run beside, and then what shall follow; None where this one waits.
+        preview: Script text and a scene that is shown instead of its own, until the script changes; None without one.
+        defer: Function that runs a text with grasp searches in the background and then calls a continuation; None: such
+            texts are run at once.
     """
 
     def __init__(
@@ -71,11 +72,11 @@ class StudioState:
         self._actor: str | None = None
         self._run()
 
-    # ---- what there is -------------------------------------------------------------------------------------------
+    # ---- state shown --------------------------------------------------------------------------------------------
 
     @property
     def scene(self) -> Scene:
-        """What the script describes; where it is broken, what its lines before the fault do."""
+        """Scene described by the script; if the script is broken, that of the lines before the error."""
         return self.performance.scene
 
     @property
@@ -102,19 +103,19 @@ class StudioState:
 
     @property
     def keys(self) -> list[float]:
-        """Frames that hold keys, of all actors and objects."""
+        """Frames with keys of any actor or object, ascending."""
         scene = self.scene
         found = [key for actor in scene.actors.values() for key in actor.key_frames]
         return sorted({*found, *(key for prop in scene.props.values() for key in prop.key_frames)})
 
     def neighbours(self) -> dict[str, float]:
-        """The keys ``before`` and ``after`` the frame that is shown, where there are any."""
+        """Frames of the nearest keys ``before`` and ``after`` the current frame, where they exist."""
         before = [key for key in self.keys if key < self.frame][-1:]
         after = [key for key in self.keys if key > self.frame][:1]
         return {which: keys[0] for which, keys in (("before", before), ("after", after)) if keys}
 
     def channels(self) -> dict[str, tuple[float, float]]:
-        """Channels of the actor that may move, with their limits in degrees."""
+        """Movable channels of the actor, with their limits [degrees]."""
         actor = self.actor
         if actor is None or actor.recorded is not None:
             return {}
@@ -127,7 +128,7 @@ class StudioState:
         }
 
     def angles(self, frame: float | None = None) -> dict[str, float]:
-        """Degrees of every channel that may move at a frame, the one that is shown at first, held at their limits."""
+        """Values of the movable channels at a frame, by default the current one, clamped to their limits [degrees]."""
         actor = self.actor
         at = self.frame if frame is None else frame
         if actor is None:
@@ -138,7 +139,7 @@ class StudioState:
         }
 
     def shown(self) -> list[Shown]:
-        """The surfaces at the frame that is shown; as contact has them, as long as it is that of this script."""
+        """Surfaces at the current frame, of the preview, the contact solution of this script, or else the scene."""
         if self.preview is not None and self.preview[0] == self.document.text:
             return self.surfaces.at(self.preview[1], self.frame, self.coloring)
         solved = self.pressed
@@ -147,7 +148,7 @@ class StudioState:
         return self.surfaces.at(solved.scene, self.frame, self.coloring, solved.surfaces)
 
     def contacts(self) -> NDArray[np.float32]:
-        """Points where something presses at the frame that is shown [m], shape (n, 3); none where none is solved."""
+        """Contact points at the current frame [m], shape (n, 3); empty if its contact is not solved."""
         solved = self.pressed
         if solved is None:
             return np.zeros((0, 3), np.float32)
@@ -155,38 +156,41 @@ class StudioState:
 
     @property
     def pressed(self) -> Pressed | None:
-        """The contact that was solved, if it is that of this script."""
+        """Solved contact, if it was solved for the current script."""
         solved = self.solved
         return solved if solved is not None and solved.text == self.document.text else None
 
     def copied_scene(self) -> Scene:
-        """A scene like this one, to be worked on beside it.
+        """Independent copy of the scene, for background jobs.
 
         Raises:
-            WarpjldError: The script cannot be run as it stands.
+            WarpjldError: The script has an error.
         """
         if self.broken and self.error is not None:
             raise self.error
         return self.performance.copied()
 
-    # ---- what is done --------------------------------------------------------------------------------------------
+    # ---- edits of the script -------------------------------------------------------------------------------------
 
     def write(self, text: str, kind: Hashable = None) -> None:
-        """The script is this text: typed, and kept with its faults."""
+        """Replace the script by a typed text, which is kept even if it has errors, and run it."""
         self.document.edit(text, kind)
         self._run()
 
     def do(self, lines: str, kind: Hashable = None) -> bool:
-        """Add lines to the script; False where they cannot be done, and then it is as it was."""
+        """Append lines to the script and run it; returns False, with the script unchanged, if they fail."""
         body = self.document.text.rstrip("\n")
         return self.put(f"{body}\n{lines}\n" if body else f"{lines}\n", kind)
 
     def put(self, text: str, kind: Hashable = None) -> bool:
-        """Make this the script if it can be run; False where it cannot, and then it is as it was. What searches for
-        grasps is deferred, and becomes the script when it is done, if nothing else was done meanwhile."""
+        """Replace the script by a text and run it; returns False, with the script unchanged, if it fails.
+
+        A text with grasp searches is run in the background; it replaces the script at the end of the search, unless the
+        script was changed meanwhile.
+        """
         if self.broken:
             assert self.error is not None
-            self.messages.append("nothing can be done by mouse before the script's fault is mended")
+            self.messages.append("the script has an error: correct its text before editing it with the mouse")
             return False
         before = self.document.text
         try:
@@ -203,7 +207,7 @@ class StudioState:
         return True
 
     def set_angles(self, angles: Mapping[str, float], kind: Hashable = None) -> bool:
-        """Set keys [degrees] of some channels at the frame that is shown; they are held at their limits."""
+        """Set keys of channels at the current frame [degrees], clamped to their limits."""
         limits, actor = self.channels(), self.actor
         if actor is None:
             return False
@@ -212,25 +216,25 @@ class StudioState:
         return self.put(with_keys(self.document.text, held, self.frame, actor=other), kind)
 
     def key_all(self) -> bool:
-        """Set keys of all channels at the frame that is shown, where they are."""
+        """Set keys of all channels at the current frame to their current values."""
         return self.set_angles(self.angles())
 
     def undo(self) -> bool:
-        """Take back what was done last; False where there is nothing to."""
+        """Undo the last change; returns False if there is none."""
         done = self.document.undo()
         if done:
             self._run()
         return done
 
     def redo(self) -> bool:
-        """Do again what was taken back last; False where there is nothing to."""
+        """Redo the change that was undone last; returns False if there is none."""
         done = self.document.redo()
         if done:
             self._run()
         return done
 
     def open(self, document: ScriptDocument, within: Sequence[Path] | None = None) -> None:
-        """Another script; files may be read from other folders than before where they are given."""
+        """Open another script; ``within`` replaces the folders that files may be read from, if given."""
         if within is not None:
             self.performance = Performance(self.folder, say=self.messages.append, within=within)
         self.document = document
@@ -238,17 +242,17 @@ class StudioState:
         self._run()
 
     def fail(self, error: WarpjldError, text: str) -> None:
-        """What was deferred cannot be run: the script is broken if this is its text, and else as it was."""
+        """Report that a deferred text failed; the script is marked as broken if this is its text."""
         self.error, self.broken = error, text == self.document.text
 
     def _put_later(self, before: str, text: str, kind: Hashable) -> None:
         if self.document.text == before:
             self.put(text, kind)
         else:
-            self.messages.append("a search ended, but the script was changed meanwhile: what it found is not used")
+            self.messages.append("a search has ended, but the script was changed meanwhile: its result is not used")
 
     def _deferred(self, text: str, then: Callable[[], object]) -> bool:
-        """Whether this text is run beside first."""
+        """Start running a text in the background if it has grasp searches; returns whether it did."""
         if self.defer is None or not self.performance.searches(text, self.document.path):
             return False
         self.defer(text, then)

@@ -23,7 +23,7 @@ Coloring = Literal["skin", "pressure", "domains", "stretch"]
 COLORINGS: tuple[Coloring, ...] = ("skin", "pressure", "domains", "stretch")
 """Quantities that skin can be coloured by."""
 
-_TOUCHED = 100.0  # pressure from which a point counts as touched [Pa]
+_TOUCHED = 100.0  # pressure from which a point counts as in contact [Pa]
 _STRETCH = ColorScale(0.6, 1.4, "length over rest", ("#2c5aa0", "#e9e4dc", "#b3261e"))
 
 
@@ -72,7 +72,7 @@ class Surfaces:
         return shown
 
     def contacts(self, scene: Scene, frame: float, pressed: DeformedSurfaces) -> NDArray[np.float32]:
-        """Points of the skin, and of objects that deform, that something presses on [m], shape (n, 3)."""
+        """Points in contact, on skin and on deformable objects [m], shape (n, 3)."""
         crowd = replace(self._crowd(scene, frame), pressed=pressed)
         points, values = self._pressures(PressureView(crowd, None), crowd)
         return points[values > _TOUCHED].astype(np.float32)

@@ -43,7 +43,7 @@ class TextField:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some keywords, or several where ``repeated``; none where ``optional``."""
+    """A choice of one keyword, or of several if ``repeated``; may be empty if ``optional``."""
 
     label: str
     options: tuple[str, ...]

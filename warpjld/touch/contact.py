@@ -101,7 +101,7 @@ class SkinContact:
         return lines
 
     def _closed_less(self) -> list[str]:
-        """Messages about digits that were closed less than posed."""
+        """Messages about digits whose closing was limited."""
         found, lines = self._closed, []
         for name, rows in ({} if found is None else found.by_digit()).items():
             assert found is not None

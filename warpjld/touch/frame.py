@@ -33,8 +33,8 @@ _SWELLS = 1.1  # factor of a mesh's largest distance from its bones at rest, to 
 # spacing, relative to a part's median thickness, of the probes that are tested first, and of the vertices that suffice
 # where the probes' depth is larger than _FEW; the weight of all others fades over as much again
 _PROBES, _APART, _FEW = 1.0, 0.3, 0.35
-_ACTS_ON = 16  # places, by vertex of the surface, for samples in the lists of the parts that they act on
-_LANES = 8  # spare places at the end of these, which are read with the last ones
+_ACTS_ON = 16  # capacity of the lists of samples that act on the parts, per vertex of the surface
+_LANES = 8  # padding at the end of these lists, which are read eight entries at a time
 _BULGE = 0.5  # largest height of a bulge
 
 

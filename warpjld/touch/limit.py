@@ -34,7 +34,7 @@ _STILL = 1e-6  # rotation from rest [rad] below which a digit cannot be opened
 
 
 def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: int = 0) -> tuple[Poses, LimitedDigits]:
-    """Poses whose digits are bent only until they touch, and the digits that this changed, by digit and frame.
+    """Limit the closing of digits to first contact; returns the poses and the digits changed, by digit and frame.
 
     The joints of a digit turn back together, by a common share of their rotation from rest: the least for which its
     deepest overlap is half of what skin can yield, and no face of it crosses another after separation. Digits are

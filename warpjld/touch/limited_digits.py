@@ -1,4 +1,4 @@
-"""Digits that were closed less than posed: a row for each digit and frame."""
+"""Table of digits whose closing was limited, with a row per digit and frame."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _ROW = np.dtype(
 
 
 class LimitedDigits(Sequence[LimitedDigit]):
-    """Limited digits of any number of frames, held as one array of numbers.
+    """Limited digits of all frames, stored in one structured array.
 
     Args:
         digits: Names of the digits.
@@ -56,7 +56,7 @@ class LimitedDigits(Sequence[LimitedDigit]):
         self._blocks: list[NDArray[Any]] = [np.zeros(0, _ROW)]
 
     def add(self, digit: int, frames: NDArray[np.int64], **values: NDArray[Any]) -> None:
-        """Add frames (n,) of one digit; values (n,) by their names, ``other`` as the number of a part, -1 for none."""
+        """Add frames (n,) of a digit, with columns (n,) by name; ``other`` is the index of a part, -1 for none."""
         rows = np.zeros(len(frames), _ROW)
         rows["digit"], rows["frame"] = digit, frames
         for name, column in values.items():
@@ -64,12 +64,12 @@ class LimitedDigits(Sequence[LimitedDigit]):
         self._blocks.append(rows)
 
     def add_all(self, others: LimitedDigits) -> None:
-        """Add what was found of the same digits; of a digit and frame the last counts."""
+        """Add another table of the same digits; later rows replace earlier ones of the same digit and frame."""
         self._blocks.append(others.rows)
 
     @property
     def rows(self) -> NDArray[Any]:
-        """All of them by digit, and by frame of each."""
+        """All rows, sorted by digit and frame."""
         if len(self._blocks) > 1:
             rows = np.concatenate(self._blocks)
             rows = rows[np.lexsort((rows["frame"], rows["digit"]))]
@@ -78,12 +78,12 @@ class LimitedDigits(Sequence[LimitedDigit]):
         return self._blocks[0]
 
     def by_digit(self) -> dict[str, NDArray[Any]]:
-        """Their rows by the name of the digit."""
+        """Rows of each limited digit, by its name."""
         rows = self.rows
         return {self._digits[n]: rows[rows["digit"] == n] for n in np.unique(rows["digit"]).tolist()}
 
     def told(self, row: Any) -> LimitedDigit:
-        """What a row says."""
+        """Record of a row of the structured array."""
         other = self._parts[int(row["other"])] if row["other"] >= 0 else ""
         depth, share, flexion = (float(row[name]) for name in ("depth", "share", "flexion"))
         digit, frame, crosses = self._digits[int(row["digit"])], int(row["frame"]), bool(row["crosses"])

@@ -1,4 +1,4 @@
-"""The triangles of a surface's parts in trees of boxes, in which a frame's kernels look for the nearest."""
+"""Bounding volume hierarchies of a surface's parts, for nearest-triangle queries of the touch kernels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from warpjld.touch.host_arrays import floats, numbers, starts
 
 __all__ = ["part_trees"]
 
-_NOWHERE = 1e17  # boxes beyond are places of a node that hold no child [m]
+_NOWHERE = 1e17  # lower bound of boxes in unused child slots of a node [m]
 
 
 def part_trees(
@@ -20,21 +20,21 @@ def part_trees(
     meshes: list[tuple[NDArray[np.int32], NDArray[np.float32]]],
     thickness: NDArray[np.float64],
 ) -> Any:
-    """The kernels' struct ``touch_beneath.PartTrees``; boxes and normals are fitted by every frame.
+    """Build the kernel struct ``touch_beneath.PartTrees``; boxes and normals are refitted in every frame.
 
     Args:
         vertices: Rest positions [m], shape (V, 3).
-        meshes: Faces of every part (n, 3), and the values of their corners (n, 3) in ``border``; some may be empty.
-        thickness: Depth of the flesh [m], shape (V,).
+        meshes: Faces of every part (n, 3), and ``border`` of their corners (n, 3); parts may be empty.
+        thickness: Thickness of the flesh [m], shape (V,).
     """
     from warpjld_kernels.touch_beneath import PartTrees
     from warpjld_kernels.triangle_tree import Tree
 
-    filled = [k for k, (faces, _) in enumerate(meshes) if len(faces)]
-    trees = [build_tree(np.asarray(vertices, dtype=np.float64), meshes[k][0]) for k in filled]
+    occupied = [k for k, (faces, _) in enumerate(meshes) if len(faces)]
+    trees = [build_tree(np.asarray(vertices, dtype=np.float64), meshes[k][0]) for k in occupied]
     joined = join_trees(trees)
     corner, border, real = [], [], []
-    for k, own in zip(filled, trees, strict=True):
+    for k, own in zip(occupied, trees, strict=True):
         faces, edge = meshes[k]
         corner.append(faces[own.face].transpose(0, 2, 1))
         border.append(edge[own.face].transpose(0, 2, 1))
@@ -42,9 +42,9 @@ def part_trees(
         valid[len(faces) :] = 0.0
         real.append(valid)
     nodes = np.zeros(len(meshes), dtype=np.int64)
-    nodes[filled] = [len(own.child) for own in trees]
+    nodes[occupied] = [len(own.child) for own in trees]
     root = np.zeros(len(meshes), dtype=np.int32)
-    root[filled] = joined.root
+    root[occupied] = joined.root
     tree = Tree()
     tree.root, tree.child, tree.face = numbers(root), numbers(joined.child), numbers(joined.face.ravel())
     tree.boxes, tree.corners = floats(joined.boxes.ravel()), floats(joined.corners.ravel())

@@ -194,7 +194,7 @@ def build_flesh_hand(
         least: Smallest scaled Jacobian.
         apart: Skin closer at rest to another digit than this many spacings is web, which is excluded from contact with
             skin as close as that.
-        bones: Surfaces of bones, in place of round ones along their segments.
+        bones: Surfaces of bones, which replace the default cylinders along their segments.
 
     Raises:
         InputError: A surface or spacing that cannot be meshed.

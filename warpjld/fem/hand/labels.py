@@ -17,9 +17,9 @@ _ENDS = {"tip": "distal", "knuckle3": "middle", "knuckle2": "proximal", "base": 
 _THUMB = {"tip": "distal", "knuckle3": "proximal", "knuckle2": "palm", "base": "wrist"}
 """Segment that ends at a thumb's joint."""
 _FOLDING = ("elbow", "knee")
-"""Joints that fold so far that flesh on both sides comes into contact."""
+"""Joints at which flesh on both sides comes into contact when they are flexed."""
 _CREASED = 0.4
-"""Width of the transition at a crease, relative to that beside a phalanx: a crease is a line."""
+"""Width of the transition at a crease, relative to that next to an excluded phalanx."""
 _BETWEEN = "middle"
 """Phalanx between a finger's first and last; a thumb has none."""
 WEB = ".web"
@@ -97,7 +97,7 @@ def _reordered(label: NDArray[np.int32], names: Sequence[str]) -> tuple[NDArray[
 
 
 def creases(names: Sequence[str], joints: Sequence[str], parents: Sequence[str]) -> NDArray[np.bool_]:
-    """Pairs of labels that a limb folds between: upper arm and forearm, thigh and shin, symmetric, shape (L, L).
+    """Pairs of labels on both sides of a fold: upper arm and forearm, thigh and shin, symmetric, shape (L, L).
 
     Args:
         names: Of the labels.
@@ -164,7 +164,7 @@ def fringes(
         label: Their labels, shape (F,).
         names: Names of the labels.
         width: Width of the transition [m]: the factor is 0 up to half a width from that border, 1 from 1.5 widths.
-        folds: Pairs of labels that a limb folds between, shape (L, L).
+        folds: Pairs of labels on both sides of a fold, shape (L, L).
     """
     from scipy.spatial import cKDTree
 
@@ -203,7 +203,7 @@ def excluded_pairs(
 
     These are pairs that belong together, except for a finger's first and last phalanx, which touch in a tight fist, and
     the two sides of a crease; all pairs within ``near`` of each other at rest: webs, and digits modelled side by side;
-    and what cannot reach one another, a foot and the face.
+    and pairs that cannot reach each other, such as foot and face.
 
     Args:
         mesh: Mesh at rest.
@@ -212,7 +212,7 @@ def excluded_pairs(
         names: Names of the labels.
         near: Distance below which pairs are excluded [m].
         joined: Pairs that belong together, shape (L, L).
-        folds: Pairs that a limb folds between, shape (L, L).
+        folds: Pairs on both sides of a fold, shape (L, L).
     """
     from scipy.spatial import cKDTree
 
@@ -233,7 +233,7 @@ def excluded_pairs(
 
 
 def _unreachable(names: Sequence[str]) -> NDArray[np.bool_]:
-    """Pairs of labels of which one cannot come to the other, whatever the joints do, symmetric, shape (L, L)."""
+    """Pairs of labels that cannot reach each other at any joint angles, symmetric, shape (L, L)."""
     words = [name.removesuffix(WEB).split(".")[-1].rstrip("0123456789") for name in names]
     whole = [name.removesuffix(WEB).split(".") for name in names]
     low = np.array(

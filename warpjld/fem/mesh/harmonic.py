@@ -11,14 +11,14 @@ __all__ = ["harmonic_field"]
 
 
 def harmonic_field(mesh: HexMesh, values: NDArray[np.float64], fixed: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Field (N, k) with given values at fixed nodes (N,), harmonic at all others.
+    """Field (N, k) with prescribed values at fixed nodes, discretely harmonic at all others.
 
-    Solves L f = 0 at the other nodes, L the graph Laplacian of the mesh's edges with weights 1 / length: an M-matrix,
-    so that values lie between the fixed ones.
+    Solves L f = 0 at the free nodes, where L is the graph Laplacian of the mesh's edges with weights 1 / length. L is
+    an M-matrix, so values at free nodes lie between the prescribed ones.
 
     Args:
-        mesh: The mesh.
-        values: Values, of which those at fixed nodes are used, shape (N, k).
+        mesh: Mesh with N nodes.
+        values: Prescribed values; only those of fixed nodes are used, shape (N, k).
         fixed: Mask of the fixed nodes, shape (N,).
     """
     from scipy.sparse import coo_array, diags_array

@@ -188,7 +188,7 @@ def varies(curve: Any) -> bool:
 
 
 def sample(scene: Any, stack: int, times: Array, out: str) -> None:
-    """Write node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4), as they lie in memory."""
+    """Write node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4), as raw float64."""
     anim = taken(taken(scene.anim_stacks[stack]).anim)
     world = np.tile(np.eye(4), (len(scene.nodes), 1, 1))
     with open(out, "wb") as file:

@@ -95,8 +95,8 @@ class FbxScene:
         pose: Node-to-world transforms of the file's bind pose, NaN for nodes that are not in it.
         meshes: Meshes in the order of their nodes.
         stacks: Animations.
-        worlds: Node-to-world transforms of the requested animation, N × 16 numbers a frame, row after row; None
-            without.
+        worlds: Node-to-world transforms of the requested animation, a row of N × 16 numbers per frame; None without
+            an animation.
         rate: Frames a second.
         title: Name of that animation.
         notes: What was left out.
@@ -174,8 +174,8 @@ def _placed(worlds: SpilledRows, axes: NDArray[np.float64], names: tuple[str, ..
 def _extract(
     path: Path, animated: bool, name: str, rate: float
 ) -> tuple[dict[str, Any], dict[str, NDArray[Any]], SpilledRows | None]:
-    """Output of :mod:`extract`, run as a program, since it may crash on a broken file; the transforms of an
-    animation's frames as rows."""
+    """Output of :mod:`extract`, run as a separate process, since it may crash on a broken file; the transforms of an
+    animation are a table with a row per frame."""
     program = Path(__file__).with_name("extract.py")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"

@@ -17,7 +17,7 @@ _JSON, _BINARY = 0x4E4F534A, 0x004E4942  # chunk types of GLB: "JSON", "BIN\0"
 
 
 def read_container(path: Path) -> tuple[str, dict[str, Any], memoryview | None]:
-    """The JSON of a glTF 2.0 file, as text and parsed, and its binary chunk, which is not copied, or None.
+    """JSON of a glTF 2.0 file, as text and parsed, and its binary chunk (a view, not a copy), None without one.
 
     Raises:
         InputError: It cannot be read, is truncated, is glTF 1.0, or not glTF.

@@ -59,7 +59,7 @@ class Document:
         """The bytes of a buffer view.
 
         Raises:
-            InputError: There is no such view, or it ends beyond its buffer.
+            InputError: The view does not exist, or exceeds its buffer.
         """
         views = self.gltf.bufferViews
         if index is None or not 0 <= index < len(views) or not 0 <= views[index].buffer < len(self.gltf.buffers):

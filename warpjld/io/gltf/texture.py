@@ -42,7 +42,7 @@ def texture_coordinates(document: Document, primitive: Any, count: int, name: st
 
 
 def base_color_picture(document: Document, primitive: Any) -> bytes | None:
-    """Picture of the base colour of a primitive, as its file holds it; None without one, or where it is not there."""
+    """Encoded image of a primitive's base colour texture; None without one, or if it is missing."""
     info, gltf = _base_colour(document, primitive), document.gltf
     if info is None or info.index is None or not 0 <= info.index < len(gltf.textures):
         return None
@@ -56,7 +56,7 @@ def base_color_picture(document: Document, primitive: Any) -> bytes | None:
         if picture.uri.startswith("data:"):
             return base64.b64decode(picture.uri.partition(",")[2])
         return read_bytes(document.path.parent / inside_folder(picture.uri))
-    except (InputError, ValueError):  # a surface is read whether or not its pictures lie beside it
+    except (InputError, ValueError):  # missing textures do not prevent reading the surface
         return None
 
 

@@ -57,7 +57,7 @@ def animate(
     at = nodes.joints
     given = np.isin(np.arange(len(nodes.parents)), at)
     moved = np.flatnonzero(nodes.under(motion.owner >= 0)).tolist()
-    # a joint's keys lie together in the file, and nothing else holds them: rotations are most of a long clip
+    # the keys of a joint are contiguous in the file; rotations are not copied, as they take most of the memory
     rotations = np.empty((len(moved), frames, 4), np.float32)
     translations: dict[int, NDArray[np.float32]] = {}
     strays, sheared = np.zeros(count), np.zeros(count)

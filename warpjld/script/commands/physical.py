@@ -88,7 +88,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
 def _with_region(
     arguments: Arguments, prop: Prop, whole: ObjectMaterial, name: str, material: ObjectMaterial
 ) -> ObjectMaterial:
-    """An object's material with another of one region of its volume file."""
+    """Copy of an object's material with the material of one region of its volume file replaced."""
     known = [region for region in region_names(prop.thing) if region.lower() == name.lower()]
     if not known:
         names = region_names(prop.thing)
@@ -141,7 +141,7 @@ def flesh(scene: Scene, arguments: Arguments) -> None:
 
 
 def _segments(arguments: Arguments, skeleton: Skeleton) -> list[str]:
-    """Segments that are named next: words with a side before a dot, or of anatomy, that are no option."""
+    """Consume the segment names that come next: words ``side.name`` or anatomical names that are not options."""
     out = []
     while (word := arguments.next_word()) is not None and ("." in word or word.lower() in SEGMENT_JOINTS):
         name = arguments.name("a segment's name").lower()

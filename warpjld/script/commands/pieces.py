@@ -1,4 +1,4 @@
-"""Objects cut into pieces that bonds hold together (B §3.2, R101, R102, R141)."""
+"""Command PIECES: cuts an object into pieces connected by bonds (B §3.2, R101, R102, R141)."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 _AXES = ("X", "Y", "Z")
 _MOST = 100
+"""Largest number of pieces."""
 _NEAR = 1e-6
-"""Distance between two pieces at which they meet, over the size of the whole."""
+"""Largest distance between vertices of two pieces that counts as shared, over the largest piece's size."""
 
 
 @command(
@@ -32,7 +33,7 @@ _NEAR = 1e-6
     group="Contact",
 )
 def pieces(scene: Scene, arguments: Arguments) -> None:
-    """Cut an object into bonded pieces, each an object with a law of its own (R101, R141)."""
+    """Cut an object into bonded pieces, each an object that can have its own constitutive law (R101, R141)."""
     from warpjld.grasp.pieces import cut_object, longest_axis
     from warpjld.simulation.volume_object import pieces_by_region
 
@@ -64,6 +65,7 @@ def pieces(scene: Scene, arguments: Arguments) -> None:
 
 
 def _strength(arguments: Arguments) -> tuple[float, float]:
+    """Tensile and shear strength of the bonds [Pa]; shear defaults to the tension."""
     normal = arguments.number("the tension in Pa at which they part", above=0.0)
     return normal, arguments.number(
         "the shear in Pa at which they part", above=0.0
@@ -71,14 +73,14 @@ def _strength(arguments: Arguments) -> tuple[float, float]:
 
 
 def _is_named(scene: Scene, name: str) -> bool:
-    """Whether contact knows of an object's points, loads or bonds."""
+    """Whether the contact specification has bonds, loads or prescribed points of an object."""
     contact = scene.contact
     bonded = any(name in (bond.one, bond.other) for bond in contact.bonds)
-    return bonded or name in contact.loaded or any(name == one for one, _ in contact.points)
+    return bonded or name in contact.loaded or any(name == owner for owner, _ in contact.points)
 
 
 def _replaced(scene: Scene, prop: Prop, cut: list[GraspObject], arguments: Arguments) -> list[str]:
-    """Put pieces where the whole was; their names."""
+    """Replace an object in the scene by its pieces; returns their names."""
     from warpjld.script.props import COLORS
     from warpjld.script.props import Prop as Piece
 
@@ -98,7 +100,7 @@ def _replaced(scene: Scene, prop: Prop, cut: list[GraspObject], arguments: Argum
 
 
 def _neighbours(cut: list[GraspObject]) -> list[tuple[int, int]]:
-    """Pairs of pieces whose surfaces share three places or more."""
+    """Pairs of pieces whose surfaces share three vertices or more."""
     from scipy.spatial import cKDTree
 
     size = max(float(thing.size.max()) for thing in cut)

@@ -206,7 +206,7 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
 def _meshed(
     actor: ActorAnimation, material: FleshMaterial, poses: Poses, skin: NDArray[np.float64]
 ) -> tuple[RestingFlesh, float, SegmentSurface | None]:
-    """Flesh meshed at the rig's rest and carried to a pose, its element edge [m], and the segments it was cut to.
+    """Flesh meshed at the rig's rest and moved to a pose, its element edge [m], and the skin of its segments, if any.
 
     Whether elements at a cut or between two digits are distorted depends on the position of the grid, so slightly
     finer grids are tried in turn. Thin parts need smaller elements.

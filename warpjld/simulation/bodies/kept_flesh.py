@@ -91,7 +91,7 @@ def resting_flesh(
         name: See ``build_flesh_hand``.
         poses: The pose (a batch of one).
         skin: Its surface in that pose [m], shape (V, 3).
-        bones: Surfaces of its bones, if there are any; otherwise bones are round.
+        bones: Surfaces of its bones, if there are any; other bones are cylinders.
 
     Raises:
         InputError: It cannot be meshed, or not in that pose.

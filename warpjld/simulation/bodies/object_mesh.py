@@ -53,7 +53,7 @@ class ObjectMesh:
         visible: Embedding of the visible surface in the mesh.
         surface: Visible surface at time 0 [m], shape (V, 3).
         faces: Triangles of that surface, shape (T, 3).
-        regions: Names of the regions of its volume file, if it has one.
+        regions: Names of the regions of its volume mesh file, if it has one.
         stress: Initial stress, in equilibrium with the inner pressure at time 0 [Pa], shape (E, 6) (R98).
         notes: Messages about cache files that could not be used.
     """
@@ -154,10 +154,10 @@ def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
 
 
 def _from_cells(name: str, thing: GraspObject, cells: VolumeCells, physical: ObjectMaterial) -> _Local:
-    """The volume mesh of an object's file.
+    """Local mesh made of the volume mesh of an object's file.
 
     Raises:
-        InputError: Something of it that the file decides.
+        InputError: A wall or an element size is specified, which the file determines.
     """
     if physical.wall or physical.element is not None:
         raise InputError("its file has a volume mesh: HOLLOW and ELEMENT are for surfaces")

@@ -224,12 +224,12 @@ def cut_to_bones(
     """The flesh of some bones of a posed hand or body.
 
     Args:
-        hand: At rest in ``poses``.
-        poses: That pose.
-        skin: Its surface there [m], shape (V, 3).
-        mine: The bones, shape (B,).
-        share: How far the flesh shapes the vertices, shape (V,); everywhere fully if left out.
-        ends: Nodes where the mesh ends within the flesh, and which follow the bones.
+        hand: Flesh mesh with ``poses`` as its rest state.
+        poses: The pose.
+        skin: Skin in this pose [m], shape (V, 3).
+        mine: Mask of the bones, shape (B,).
+        share: Weight of the flesh's deformation at each skin vertex, shape (V,); None: 1 everywhere.
+        ends: Nodes where the mesh is cut through the flesh; they follow the bones.
     """
     start = hand.moves(poses)
     own = hand.weights[:, mine].sum(axis=1)

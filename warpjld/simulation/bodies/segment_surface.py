@@ -1,7 +1,7 @@
-"""The skin of some segments of a body, so that only their flesh is meshed (R105, R126).
+"""Skin of selected segments of a body, so that only their flesh is meshed (R105, R126).
 
-A whole body in elements of a centimetre has a hundred thousand of them, two segments of an arm some thousand. The skin
-is cut a little beyond the segments; where it is open there, the mesh ends, and is held by the bones.
+A whole body meshed with elements of 1 cm has about a hundred thousand, two segments of an arm a few thousand. The skin
+is cut a margin beyond the segments; the mesh ends at this cut, and is held by the bones there.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from warpjld.skeleton.segments import segment_joints
 __all__ = ["SegmentSurface", "segment_surface"]
 
 _MARGIN = 4.0
-"""Skin that is meshed beyond the segments, in elements: that far the flesh gives way less and less."""
+"""Width of the skin meshed beyond the segments, in elements; the share of deformation falls to 0 over it."""
 _RIM = 0.3
-"""Distance from the skin, in elements, from which on a node of the mesh's boundary lies where it was cut off."""
+"""Distance from the skin, in elements, beyond which a node of the mesh's boundary belongs to the cut."""
 
 
 @dataclass(frozen=True, eq=False)
 class SegmentSurface:
-    """The skin of some segments of a rig.
+    """Skin of selected segments of a rig.
 
     Attributes:
-        rig: The rig with this skin only, open where it was cut off.
-        whole: The skin of the whole rig.
-        vertices: Rows of its vertices there, shape (v,).
-        share: How far they belong to the segments, falling to 0 where the skin was cut off, shape (V,).
-        joints: That the segments begin at.
+        rig: The rig with this part of the skin only, open at the cut.
+        whole: Skin of the whole rig, V vertices.
+        vertices: Indices of the part's vertices in ``whole``, shape (v,).
+        share: Weight of each vertex of ``whole``: 1 on the segments, falling to 0 at the cut, shape (V,).
+        joints: Joints at the proximal ends of the segments.
     """
 
     rig: Rig
@@ -47,21 +47,21 @@ class SegmentSurface:
     joints: frozenset[int]
 
     def widened(self, hand: FleshHand) -> FleshHand:
-        """A mesh of this skin as that of the whole rig: vertices beyond it have weights of 0."""
-        small, count = hand.flesh.skin, len(self.whole.vertices)
+        """Flesh mesh of this part, embedded in the whole rig's skin: vertices outside the part have weights of 0."""
+        part, count = hand.flesh.skin, len(self.whole.vertices)
         corners = np.zeros((count, 8), np.int32)
         weights, outside = np.zeros((count, 8)), np.zeros(count)
-        corners[self.vertices], weights[self.vertices] = small.corners, small.weights
-        outside[self.vertices] = small.outside
+        corners[self.vertices], weights[self.vertices] = part.corners, part.weights
+        outside[self.vertices] = part.outside
         flesh = replace(hand.flesh, skin=Embedding(corners, weights, outside))
         return replace(hand, flesh=flesh, surface=self.whole)
 
     def bones(self, hand: FleshHand) -> NDArray[np.bool_]:
-        """Bones of the segments among those of a mesh, shape (B,)."""
+        """Mask of the mesh's bones that belong to the segments, shape (B,)."""
         return np.array([parent in self.joints for parent in hand.flesh.parents])
 
     def ends(self, hand: FleshHand, spacing: float) -> NDArray[np.int64]:
-        """Nodes of a mesh at the rig's rest where this skin was cut off."""
+        """Indices of the boundary nodes of a rest mesh that lie at the cut; ``spacing``: edge of its elements [m]."""
         from warpjld.fem.contact.obstacles.facets import Facets
 
         outer = np.unique(hand.mesh.quads(hand.skin_faces))
@@ -71,21 +71,21 @@ class SegmentSurface:
         return outer[away > _RIM * spacing].astype(np.int64)
 
     def gap(self, hand: FleshHand, skin: NDArray[np.float64], ends: NDArray[np.int64]) -> float:
-        """Greatest distance of a posed mesh's skin nodes, its ends apart, from the rig's skin there (V, 3) [m]."""
+        """Greatest distance of a posed mesh's skin nodes, except ``ends``, from the posed skin (V, 3) [m]."""
         from warpjld.fem.contact.obstacles.facets import Facets
 
         outer = np.setdiff1d(np.unique(hand.mesh.quads(hand.skin_faces)), ends)
-        there = Facets(skin[self.vertices], self.rig.surface.faces).project(hand.mesh.nodes[outer])
-        return float(np.linalg.norm(hand.mesh.nodes[outer] - there.closest, axis=1).max(initial=0.0))
+        found = Facets(skin[self.vertices], self.rig.surface.faces).project(hand.mesh.nodes[outer])
+        return float(np.linalg.norm(hand.mesh.nodes[outer] - found.closest, axis=1).max(initial=0.0))
 
 
 def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spacing: float) -> SegmentSurface:
-    """The skin of named segments (``segment_joints`` has the words), and a margin around it.
+    """Cut out the skin of named segments and a margin around it.
 
     Args:
         rig: Surface and skeleton.
-        covering: Its skin bound to its skeleton.
-        segments: Their names.
+        covering: The rig's skin bound to its skeleton.
+        segments: Names of the segments, see :func:`~warpjld.skeleton.segments.segment_joints`.
         spacing: Edge length of the elements [m].
 
     Raises:
@@ -103,7 +103,7 @@ def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spaci
     if not inside.any():
         raise InputError(f"no skin belongs to {', '.join(segments)}")
     margin = _MARGIN * spacing
-    away = _way_over_skin(surface, inside, margin)
+    away = _edge_distance(surface, inside, margin)
     chosen = np.flatnonzero(away <= margin)
     share = np.clip(1.0 - away / margin, 0.0, 1.0)
     number = np.full(len(surface.vertices), -1, np.int32)
@@ -119,8 +119,8 @@ def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spaci
     return SegmentSurface(small, surface, chosen, share * share * (3.0 - 2.0 * share), frozenset(joints))
 
 
-def _way_over_skin(surface: Surface, start: NDArray[np.bool_], limit: float) -> NDArray[np.float64]:
-    """Length of the way along edges from the nearest of some vertices [m], infinite beyond ``limit``, shape (V,)."""
+def _edge_distance(surface: Surface, start: NDArray[np.bool_], limit: float) -> NDArray[np.float64]:
+    """Distance along edges to the nearest vertex of a mask [m], infinite beyond ``limit``, shape (V,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
@@ -128,5 +128,5 @@ def _way_over_skin(surface: Surface, start: NDArray[np.bool_], limit: float) -> 
     length = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
     count = len(surface.vertices)
     graph = coo_array((length + 1e-12, (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
-    way = dijkstra(graph, directed=False, indices=np.flatnonzero(start), limit=limit, min_only=True)
-    return np.asarray(way, np.float64)
+    distance = dijkstra(graph, directed=False, indices=np.flatnonzero(start), limit=limit, min_only=True)
+    return np.asarray(distance, np.float64)

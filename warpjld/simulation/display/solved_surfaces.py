@@ -1,4 +1,4 @@
-"""What is seen of solved frames, and shown in a notebook."""
+"""Visible surfaces of solved frames, and their view for notebooks."""
 
 from __future__ import annotations
 
@@ -20,11 +20,17 @@ __all__ = ["surfaces_of_frames", "view_of_frames"]
 
 _OBJECT = "#8fa3b8"
 _COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
-_LEAST = 1.0  # Pa: the scale's top where nothing presses
+_LEAST = 1.0  # Pa: top of the colour scale if there is no contact pressure
 
 
 def surfaces_of_frames(model: ContactModel, frames: Sequence[SolvedFrame], before: StartFrame) -> DeformedSurfaces:
-    """What is seen of frames that were solved with this model, or with one that was edited since."""
+    """Visible surfaces of solved frames.
+
+    Args:
+        model: Contact model that the frames were solved with, or an edited version of it.
+        frames: Solved frames.
+        before: Start frame, with the objects moved before the first frame.
+    """
     animation = model.animation
     assert animation is not None
     return DeformedSurfaces(
@@ -37,12 +43,12 @@ def surfaces_of_frames(model: ContactModel, frames: Sequence[SolvedFrame], befor
 
 
 def view_of_frames(surfaces: DeformedSurfaces) -> SurfaceView:
-    """Pressure on everything that deforms, and what is rigid beside it, frame by frame."""
+    """View of contact pressure on all deformable bodies, with the rigid objects, by frame."""
     from warpjld.page.view import SurfaceView
     from warpjld.render import ColorScale
 
     scale = ColorScale(0.0, max(_LEAST, surfaces.high), "contact pressure, kPa", _COLORS, factor=1e-3)
-    numbers = [surfaces.model.start, *(one.frame for one in surfaces.frames)] if surfaces.frames else []
+    numbers = [surfaces.model.start, *(solved.frame for solved in surfaces.frames)] if surfaces.frames else []
     return SurfaceView([_seen(surfaces, frame, scale) for frame in numbers], numbers=numbers)
 
 

@@ -1,4 +1,4 @@
-"""Contact pressure on what is seen."""
+"""Record of the contact pressure on a visible surface."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class VisiblePressure:
     """Contact pressure on a visible surface at a frame.
 
     Attributes:
-        vertices: Vertices of the surface, refined where it is ever in contact [m], shape (V, 3); the original ones
-            come first.
+        vertices: Vertices of the surface, refined where it is in contact at any frame [m], shape (V, 3); the original
+            ones come first.
         triangles: Triangles of the refined surface, shape (T, 3).
-        pressure: [Pa], shape (V,); its integral over the surface is the normal contact force.
+        pressure: Pressure at the vertices [Pa], shape (V,); its integral over the surface is the normal contact force.
     """
 
     vertices: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Bonds that break, and impacts that open what was bonded, frame by frame (R93, R102)."""
+"""Messages about bonds that break during a simulation (R93, R102)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["parted_notes"]
 
 
 def parted_notes(model: ContactModel, frames: Sequence[SolvedFrame], start: float) -> list[str]:
-    """What part of which bond broke up to which frame, in words.
+    """Messages about bonds that break wholly or in part, with the frames between which they do.
 
     Args:
-        model: Everything.
-        frames: As they were solved.
-        start: Frame before the first of them.
+        model: The contact model.
+        frames: Solved frames.
+        start: Number of the frame before the first of them.
     """
     out = []
     for k, (pair, owner) in enumerate(zip(model.pairs, model.owners, strict=True)):

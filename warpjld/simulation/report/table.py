@@ -33,24 +33,25 @@ class ContactRow:
     Attributes:
         frame: Frame number.
         actor: Name of the actor.
-        digit: ``index`` …, or ``palm`` for everything else of the hand.
-        against: Names of what it touches, joined by ``+``.
+        digit: Digit (``index`` …), or ``palm`` for the rest of the hand.
+        against: Names of the bodies and obstacles that it touches, joined by ``+``.
         force_n: Magnitude of the resultant of its contact forces [N].
-        fx_n, fy_n, fz_n: That resultant [N].
-        area_mm2: Contact area, with its border interpolated between nodes [mm²].
-        peak_kpa: Highest pressure: normal force on a node over its tributary area [kPa]; the highest of all is the top
-            of the pictures' colour scale.
-        bone_n: Magnitude of the resultant of the reactions at its bones, minus those of the same hand in the same pose
-            without contact [N]. Reactions at cut flesh count for the bones that move the cut.
-        flesh_n: Magnitude of the latter [N], due to the weight of its flesh and to its strain since time 0 where joints
-            bend; NaN for the palm, and if the flesh alone has no equilibrium (``bone_n`` is then from contact forces
-            assigned to the nearest bones).
+        fx_n, fy_n, fz_n: Components of this resultant, world frame [N].
+        area_mm2: Contact area; its border is interpolated between nodes [mm²].
+        peak_kpa: Highest nodal pressure, i.e. normal force on a node divided by its tributary area [kPa]. The maximum
+            over all rows is the upper end of the colour scale in pictures.
+        bone_n: Magnitude of the resultant reaction at its bones, after subtracting that of the same hand in the same
+            pose without contact [N]. Reactions where the flesh mesh is cut off count for the bones that move the cut.
+        flesh_n: Magnitude of the subtracted reaction without contact [N], which is due to the weight of the flesh and
+            its strain by flexion since time 0. NaN for the palm, and if the flesh has no equilibrium without contact;
+            ``bone_n`` is then computed from contact forces assigned to the nearest bones.
         limit_n: Force limit of its muscles [N]; NaN for the palm.
-        share: Largest ratio of ``bone_n`` and its torques about the digit's joints to their limits; NaN for the palm.
+        share: Muscle load: the largest of ``bone_n`` and the torques about the digit's joints, each relative to its
+            limit; NaN for the palm.
         sliding: Share of the contact area that slides; NaN without contact.
         state: ``free``, ``sticking``, ``sliding``, or ``partly sliding``.
-        short_deg: Largest difference by which a joint of the digit stays behind the requested animation [degrees]; 0 if
-            none does, and for the palm.
+        short_deg: Largest lag of a joint's flexion in this digit behind the requested animation [degrees]; 0 without a
+            lag, and for the palm.
     """
 
     frame: float
@@ -74,14 +75,14 @@ class ContactRow:
 
 @dataclass(frozen=True)
 class JointOpening:
-    """A joint that should be opened, so that muscles can bear a digit's force.
+    """Suggestion to open a joint, so that the muscles can bear a digit's force.
 
     Attributes:
-        actor: Whose.
-        frame: Where it strains most.
-        joint: Its name; empty where no joint is known that would help.
-        degrees: How far to open it.
-        text: The same, and why.
+        actor: Name of the actor.
+        frame: Frame at which the muscles are loaded most.
+        joint: Name of the joint; empty if no joint is known that would help.
+        degrees: Angle by which to open it [degrees].
+        text: The suggestion with its reason, for display.
     """
 
     actor: str

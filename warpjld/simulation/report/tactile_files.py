@@ -13,19 +13,19 @@ __all__ = ["TACTILE_COLUMNS", "draw_tactile", "tactile_rows", "write_tactile"]
 
 TACTILE_COLUMNS = (
     Column("time", "number", "", "Time of the equilibrium: frame number where frames drive the hand."),
-    Column("pad", "text", "", "Segment the skin belongs to: digit and phalanx, or palm and the digit below it."),
-    Column("touching", "truth", "", "Whether anything presses the pad."),
-    Column("force_x", "number", "N", "Force on the pad, friction included, world frame."),
-    Column("force_y", "number", "N", "The same along y."),
-    Column("force_z", "number", "N", "The same along z."),
-    Column("normal_force", "number", "N", "Part of it that presses the skin in: pressure summed over the area."),
-    Column("centre_x", "number", "m", "Centre of pressure, world frame; missing where nothing presses."),
-    Column("centre_y", "number", "m", "The same along y."),
-    Column("centre_z", "number", "m", "The same along z."),
-    Column("area", "number", "m²", "Area under pressure, inside a border that runs between nodes."),
-    Column("peak_pressure", "number", "Pa", "Highest pressure: what presses on a node over the skin around it."),
-    Column("slip", "number", "m", "Way along the other side since the instant before, mean over the area."),
-    Column("sticking", "number", "", "Share of the area that friction holds; missing where nothing presses."),
+    Column("pad", "text", "", "Skin segment: digit and phalanx, or palm and the digit next to this part of it."),
+    Column("touching", "truth", "", "Whether the pad is in contact."),
+    Column("force_x", "number", "N", "Contact force on the pad, including friction; world frame, x component."),
+    Column("force_y", "number", "N", "Contact force, y component."),
+    Column("force_z", "number", "N", "Contact force, z component."),
+    Column("normal_force", "number", "N", "Normal contact force: pressure integrated over the contact area."),
+    Column("centre_x", "number", "m", "Centre of pressure, world frame, x coordinate; empty without contact."),
+    Column("centre_y", "number", "m", "Centre of pressure, y coordinate."),
+    Column("centre_z", "number", "m", "Centre of pressure, z coordinate."),
+    Column("area", "number", "m²", "Contact area; its border is interpolated between nodes."),
+    Column("peak_pressure", "number", "Pa", "Highest pressure: normal force on a node over its tributary area."),
+    Column("slip", "number", "m", "Slip distance since the previous time, averaged over the contact area."),
+    Column("sticking", "number", "", "Share of the contact area that sticks; empty without contact."),
 )
 """One row for each time and pad."""
 
@@ -86,13 +86,13 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "tim
     columns = max(1, len(groups))
     figure = Figure(figsize=(3.1 * columns + 0.8, 8.2), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title or "What the skin feels", fontsize=13)
+    figure.suptitle(title or "Tactile readings", fontsize=13)
     axes: Any = figure.subplots(4, columns, squeeze=False, sharex=True, sharey="row")
     rows = (
         ("normal force, N", tactile.normal_force, 1.0),
         ("area, mm²", tactile.area, 1e6),
-        ("slip in the step, mm", tactile.slip, 1e3),
-        ("share that sticks", tactile.sticking, 1.0),
+        ("slip since the previous time, mm", tactile.slip, 1e3),
+        ("sticking share of the area", tactile.sticking, 1.0),
     )
     for column, (group, members) in enumerate(groups.items()):
         axes[0, column].set_title(group, fontsize=11)
@@ -110,12 +110,12 @@ def draw_tactile(path: Path, tactile: Tactile, title: str = "", axis: str = "tim
     for place in axes[3]:
         place.set_ylim(-0.05, 1.05)
     if not groups:
-        axes[0, 0].text(0.5, 0.5, "nothing touches", ha="center", transform=axes[0, 0].transAxes)
+        axes[0, 0].text(0.5, 0.5, "no contact", ha="center", transform=axes[0, 0].transAxes)
     with whole_file(path) as part:
         figure.savefig(part, metadata={"Software": None})
 
 
 def _group(pad: str) -> str:
-    """Digit of a pad, or ``palm``; for pads of no hand, the last part but one of the name, else ``palm``."""
+    """Digit of a pad, or ``palm``; for pads outside hands, the last part but one of the name, else ``palm``."""
     parts = pad.split(".")
     return "palm" if "palm" in parts or len(parts) < 2 or parts[-1] in ("wrist", "forearm") else parts[-2]

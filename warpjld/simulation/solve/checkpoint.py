@@ -51,7 +51,7 @@ class Checkpoint:
         grips: Grips found so far, as plain values (``grip_content``).
         edited: Number of edits at the time each frame was solved.
         corrected: Digits that corrections opened.
-        uncorrected: Digits that corrections could not help, in words.
+        uncorrected: Messages about digits that corrections could not help.
         identity: Hashes of the simulation it belongs to, by name of the part (see ``identity_of``).
     """
 

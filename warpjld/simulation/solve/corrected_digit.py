@@ -1,4 +1,4 @@
-"""Record of a digit that a correction opened (R120); results and state files hold it."""
+"""Record of the correction of a digit (R120), part of results and state files."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def _settings(contact: ContactSpecification) -> Iterator[tuple[str, Any]]:
 
 
 def _plain(value: Any) -> Any:
-    """What is no plain value: a file by its name, a record by its fields."""
+    """JSON-compatible form of a value: the name of a path, the fields of a dataclass."""
     if isinstance(value, Path):
         return value.name
     return {one.name: getattr(value, one.name) for one in fields(value) if one.name not in _SILENT}

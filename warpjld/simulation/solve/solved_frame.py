@@ -48,7 +48,13 @@ class SolvedFrame:
 
 
 def solved_frame(frame: float, instants: Sequence[ContactInstant], states: Sequence[ContactState] = ()) -> SolvedFrame:
-    """Results of a frame from its load steps, the last of them, with its contact states, at the frame; slip adds up."""
+    """Results of a frame: those of its last load step, with slip summed over its load steps.
+
+    Args:
+        frame: Frame number.
+        instants: Equilibria of the load steps; the last is at the frame.
+        states: Contact states of the last load step, by pair.
+    """
     last = instants[-1]
     count = len(last.displacement)
     nodal = np.stack([t.nodal for t in last.touches]) if last.touches else np.zeros((0, count, 3))
@@ -65,6 +71,6 @@ def solved_frame(frame: float, instants: Sequence[ContactInstant], states: Seque
 
 
 def _bonded(state: ContactState) -> float:
-    """Share of the points that were bonded at first which still are."""
+    """Share of the initially bonded points that are still bonded."""
     at_first = np.isfinite(state.bond_gap)
     return float(state.bonded[at_first].mean()) if at_first.any() else 1.0

@@ -170,7 +170,7 @@ class _Approach:
         return places
 
     def _actors_meet(self, frame: float, skins: dict[str, NDArray[np.float64]]) -> bool:
-        """Whether skin of two actors whose flesh deforms has passed through one another (R126)."""
+        """Whether the skins of two actors with deformable flesh interpenetrate (R126)."""
         for one, other in combinations(self._actors, 2):
             low, high = (np.stack([how(skins[name], axis=0) for name in (one, other)]) for how in (np.min, np.max))
             if (low.max(axis=0) > high.min(axis=0)).any():

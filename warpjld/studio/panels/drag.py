@@ -33,7 +33,7 @@ class DragPanel:
         self.what.on_update(lambda event: room.by_hand(event, lambda: None))
 
     def take(self, digit: str | None) -> None:
-        """Put the handle on a digit's tip, if there is one."""
+        """Put the handle on the tip of a digit, if the actor has this digit."""
         if digit in self.what.options:
             self.what.value = digit
 

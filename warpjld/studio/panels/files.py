@@ -1,4 +1,4 @@
-"""Files: scripts of this folder, and those that were open lately."""
+"""Files panel: scripts in the current folder and recently opened ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NOTHING = "—"
 
 
 class FilesPanel:
-    """Opening and saving inside the script's folder; a script that was open lately is opened wherever it is."""
+    """Controls to open and save scripts; except for recent ones, scripts must be in the current script's folder."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -36,9 +36,9 @@ class FilesPanel:
         self.recent.on_update(lambda event: room.by_hand(event, self._reopen))
 
     def refresh(self) -> None:
-        """Show the files that there are."""
+        """Update the lists of scripts."""
         path = self._room.state.document.path
-        scripts = (_NOTHING, *sorted(one.name for one in path.parent.glob("*.jld")))
+        scripts = (_NOTHING, *sorted(script.name for script in path.parent.glob("*.jld")))
         if tuple(self.scripts.options) != scripts:
             self.scripts.options = scripts
         if path != self._noted:
@@ -49,7 +49,7 @@ class FilesPanel:
 
     def _list_recent(self) -> None:
         here = self._room.state.document.path
-        self._recent = {f"{one.name} ({one.parent.name})": one for one in recent_scripts() if one != here}
+        self._recent = {f"{path.name} ({path.parent.name})": path for path in recent_scripts() if path != here}
         self.recent.options = (_NOTHING, *self._recent)
 
     def _choose(self) -> None:
@@ -67,12 +67,13 @@ class FilesPanel:
         self._room.state.open(document, within=None if inside else readable(document))
         self.name.value = path.name
 
-    def _file(self, what: str) -> None:
+    def _file(self, action: str) -> None:
+        """Perform ``save``, ``open`` or ``new`` on the named file."""
         state = self._room.state
 
         def act() -> None:
             path = self._path()
-            match what:
+            match action:
                 case "save":
                     state.messages.append(f"saved {state.document.save(path).name}")
                     note_recent(path)
@@ -86,7 +87,7 @@ class FilesPanel:
         self._room.post(act)
 
     def _path(self) -> Path:
-        """The file in the script's folder that is named."""
+        """Path of the named file in the script's folder."""
         folder = self._room.state.document.path.parent
         name = check_name(self.name.value.strip(), "the script's name")
         if Path(name).name != name:

@@ -1,4 +1,4 @@
-"""Ghosts: the actors as they are at the keys before and after the frame that is shown."""
+"""Ghosts (onion skins): actors at the key frames before and after the current frame."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["GhostsPanel"]
 
 _COLORS = {"before": "#4c78a8", "after": "#e07b39"}
 _OPACITY = 0.18
-_INSIDE = 4e-4  # m
+_INSET = 4e-4  # m
 
 
 class GhostsPanel:
-    """Neighbouring keys, blue for the one before and orange for the one after."""
+    """Translucent actors at the previous key frame (blue) and the next one (orange)."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -31,15 +31,15 @@ class GhostsPanel:
         self.on.on_update(lambda event: room.by_hand(event, lambda: None, key="ghosts"))
 
     def refresh(self) -> None:
-        """Draw them."""
+        """Update the ghosts in the scene."""
         state = self._room.state
         wanted: dict[str, Any] = {}
         for which, key in state.neighbours().items() if self.on.value else ():
-            for one in state.surfaces.at(state.scene, key):
-                if one.name in state.scene.actors:
-                    # a little inside, so that skin that has not moved hides its ghost
-                    inside = one.vertices - np.float32(_INSIDE) * vertex_normals(one.vertices, one.faces)
-                    wanted[f"/ghosts/{which}/{one.name}"] = which, inside, one.faces
+            for shown in state.surfaces.at(state.scene, key):
+                if shown.name in state.scene.actors:
+                    # moved inwards, so that skin that is the same at both frames hides its ghost
+                    inset = shown.vertices - np.float32(_INSET) * vertex_normals(shown.vertices, shown.faces)
+                    wanted[f"/ghosts/{which}/{shown.name}"] = which, inset, shown.faces
         for name in [*self._meshes]:
             if name not in wanted or len(self._drawn[name]) != len(wanted[name][1]):
                 self._meshes.pop(name).remove()

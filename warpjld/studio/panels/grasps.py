@@ -1,4 +1,4 @@
-"""Grasps: digits closed where they are, and ways to take an object to choose from."""
+"""Grasps panel: closing and opening of the hand, and choice among grasps found by a search."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NOTHING = "—"
 
 
 class GraspsPanel:
-    """Buttons that close and open the hand, and the list of ways that AUTO found, each shown when it is clicked."""
+    """Buttons that close and open the hand, and a list of the grasps that AUTO found, with preview."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -33,7 +33,7 @@ class GraspsPanel:
         self.take.on_click(lambda _: room.post(self._take))
 
     def refresh(self) -> None:
-        """Show the ways as long as the script is the one that they are for."""
+        """Show the found grasps as long as the script is the one they were searched for."""
         if self._ways and self._text != self._room.state.document.text:
             self._ways = {}
         names = (_NOTHING, *self._ways)
@@ -44,20 +44,21 @@ class GraspsPanel:
                 control.visible = bool(self._ways)
 
     def _command(self) -> tuple[str, str, str]:
-        """First frame, last frame and side."""
+        """First frame, last frame and side, as words of a command."""
         state = self._room.state
         sides = {name.partition(".")[0] for name in state.channels()} & {"left", "right"}
         side = sorted(sides)[0].upper() if sides else ""
         return number(state.frame), number(state.frame + self.length.value), side
 
-    def _grasp(self, what: str) -> None:
+    def _grasp(self, action: str) -> None:
+        """Append the command for ``close`` or ``release``, or search for ``auto``."""
         first, last, side = self._command()
         state, thing = self._room.state, self._room.things.which.value
-        if what == "release":
+        if action == "release":
             state.do(f"RELEASE {first} {last} {side}".rstrip())
             return
         line = " ".join(word for word in ("GRASP", first, last, side, thing) if word)
-        if what == "close":
+        if action == "close":
             state.do(line)
             return
         self._search(f"{line} AUTO")
@@ -65,7 +66,7 @@ class GraspsPanel:
     def _search(self, line: str) -> None:
         state = self._room.state
         text, path, last = state.document.text, state.document.path, state.frame + self.length.value
-        state.copied_scene()  # a script that cannot be run is refused here
+        state.copied_scene()  # raises the error of a script that cannot be run
         performance = state.performance.beside()
 
         def work(progress: JobProgress) -> list[GraspWay]:
@@ -75,15 +76,15 @@ class GraspsPanel:
             if state.document.text == text:
                 known = {} if self._text != text else self._ways
                 every = {way.title: way for way in ways} | known
-                self._ways = dict(sorted(every.items(), key=lambda one: -float(one[1].outcome.values["score"])))
+                self._ways = dict(sorted(every.items(), key=lambda item: -float(item[1].outcome.values["score"])))
                 self._text = text
                 self._show(next(iter(self._ways)), last)
 
-        def told(ways: list[GraspWay]) -> None:
-            state.messages.append(f"{len(ways)} ways to take it: choose one under Objects")
+        def done(ways: list[GraspWay]) -> None:
+            state.messages.append(f"{len(ways)} grasps found: choose one under Objects")
 
         self._ways = {}
-        self._room.progress.start("GRASP AUTO", work, told)
+        self._room.progress.start("GRASP AUTO", work, done)
 
     def _show(self, title: str, frame: float) -> None:
         way = self._ways[title]

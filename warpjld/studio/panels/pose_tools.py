@@ -86,7 +86,7 @@ class PoseToolsPanel:
         self._room.state.do(f"POSE {self.side.value.upper()} {which} {number(self._room.state.frame)}{share}")
 
     def _picture(self) -> None:
-        """Pictures of all poses there are, as they are now."""
+        """Render the contact sheet of all poses in the background, and show it."""
         own = {name: load_pose(self._folder().parent / name) for name in self.pose.options if name not in SHIPPED}
         poses = {name: shipped_pose(name) for name in SHIPPED} | {Path(name).stem: one for name, one in own.items()}
 

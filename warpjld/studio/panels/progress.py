@@ -1,4 +1,4 @@
-"""Work that is being done beside the studio: how far it is, and a button that ends it."""
+"""Progress bar and cancel button of the running background job."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["ProgressPanel"]
 
 
 class ProgressPanel:
-    """One piece of work at a time, above all tabs."""
+    """Runs one background job at a time and shows its progress above all tabs."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -27,7 +27,7 @@ class ProgressPanel:
         self.cancel.on_click(lambda _: self.work.cancel())
 
     def refresh(self) -> None:
-        """Show what is being done."""
+        """Update the progress bar and the step's description."""
         running = self.work.running is not None
         for control in (self.bar, self.step, self.cancel):
             if control.visible != running:
@@ -43,16 +43,17 @@ class ProgressPanel:
         told: Callable[[Any], object],
         failed: Callable[[BaseException], object] | None = None,
     ) -> None:
-        """Begin work; ``told`` gets its result, on the studio's own thread.
+        """Start a background job; its callbacks are called on the studio's own thread.
 
         Args:
-            what: Its name.
-            work: Does it.
-            told: Gets the result.
-            failed: Gets what was raised, or that it was cancelled; the message is shown in any case.
+            what: Name of the job, for messages.
+            work: Function that does the job.
+            told: Called with its result.
+            failed: Called with the exception, or with an :class:`InputError` if cancelled; an exception's message is
+                shown in any case.
 
         Raises:
-            InputError: Something is being done already.
+            InputError: Another job is running.
         """
 
         def show(result: object, error: BaseException | None) -> None:

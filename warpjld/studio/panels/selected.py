@@ -1,4 +1,4 @@
-"""The joint that is selected, by a click on the skin or by name: its channels, and a mark where it is."""
+"""Panel of the selected joint: its sliders, and a mark at its position; selected by name or by a click on the skin."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _MARK = "#228be6"
 
 
 class SelectedPanel:
-    """Clicking the skin selects the joint that moves it there, and takes the digit's tip by a handle."""
+    """Selection of a joint: a click on the skin selects the joint that moves it and puts the handle on its tip."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
         self._sliders: dict[str, Any] = {}
-        self._of: object = None
+        self._made_for: object = None
         self._mark: Any = None
         gui = room.server.gui
         self._folder = gui.add_folder("Selected joint")
@@ -35,7 +35,7 @@ class SelectedPanel:
         room.server.scene.on_click()(self._click)
 
     def select(self, joint: str) -> None:
-        """Select a joint of the actor; one of a digit takes its tip by the handle, and its skin's parameters."""
+        """Select a joint of the actor, put the drag handle on its digit's tip, and show its skin parameters."""
         state = self._room.state
         known = state.actor is not None and joint in state.actor.skeleton.names
         state.joint = joint if known else None
@@ -44,7 +44,7 @@ class SelectedPanel:
             self._room.skin.choose(joint)
 
     def refresh(self) -> None:
-        """Show the joint's channels, and mark it."""
+        """Update the sliders of the joint's channels and its mark."""
         state, actor = self._room.state, self._room.state.actor
         names = (_NOTHING, *({name.rpartition(".")[0]: None for name in state.channels()}))
         if tuple(self.joint.options) != names:
@@ -54,15 +54,15 @@ class SelectedPanel:
         if self.joint.value != (state.joint or _NOTHING):
             self.joint.value = state.joint or _NOTHING
         limits = {name: span for name, span in state.channels().items() if name.rpartition(".")[0] == state.joint}
-        if self._of != (made := tuple(limits.items())):
-            self._make(limits)
-            self._of = made
+        if self._made_for != (key := tuple(limits.items())):
+            self._make_sliders(limits)
+            self._made_for = key
         for name, degrees in state.angles().items():
             if name in self._sliders:
                 show_angle(self._room, self._sliders[name], name, degrees)
         self._show_mark()
 
-    def _make(self, limits: dict[str, tuple[float, float]]) -> None:
+    def _make_sliders(self, limits: dict[str, tuple[float, float]]) -> None:
         for slider in self._sliders.values():
             slider.remove()
         with self._folder:
@@ -70,15 +70,16 @@ class SelectedPanel:
 
     def _show_mark(self) -> None:
         state, actor = self._room.state, self._room.state.actor
-        one = next((one for one in self._room.stage.drawn if actor is not None and one.name == actor.name), None)
-        if actor is None or one is None or one.joints is None or state.joint is None:
+        drawn = self._room.stage.drawn
+        skin = next((shown for shown in drawn if actor is not None and shown.name == actor.name), None)
+        if actor is None or skin is None or skin.joints is None or state.joint is None:
             if self._mark is not None:
                 self._mark.remove()
                 self._mark = None
             return
-        place = one.joints[actor.skeleton.index(state.joint)].astype(np.float32)[None]
+        place = skin.joints[actor.skeleton.index(state.joint)].astype(np.float32)[None]
         if self._mark is None:
-            size = 0.02 * float(np.ptp(one.vertices, axis=0).max())
+            size = 0.02 * float(np.ptp(skin.vertices, axis=0).max())
             color = np.array(rgb(_MARK), np.uint8)
             self._mark = self._room.server.scene.add_point_cloud(
                 "/selected", place, color, point_size=size, point_shape="circle"

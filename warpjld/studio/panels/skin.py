@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 __all__ = ["SkinPanel"]
 
 _RANGES = {"inflation": (0.0, 2.0), "muscle": (0.0, 1.0), "peak": (0.05, 0.95), "palm": (0.0, 6.0)}
-_NEAR = ("Proximity after", "Proximity before")  # of the segment that begins at the joint; of the one that ends there
-_HALF = 0.5  # two joints of a segment may round half of it each
+_NEAR = ("Proximity after", "Proximity before")  # for the segments that begin and end at the joint
+_HALF = 0.5  # largest proximity: each joint of a segment may round half of it
 _ALL = "ALL"
 
 
@@ -30,7 +30,7 @@ class SkinPanel:
         self.joint.on_update(lambda event: room.by_hand(event, lambda: None))
 
     def choose(self, joint: str) -> None:
-        """Show the parameters of a joint."""
+        """Choose the joint whose parameters are shown."""
         if joint in self.joint.options:
             self.joint.value = joint
 

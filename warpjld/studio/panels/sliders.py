@@ -48,7 +48,7 @@ class SlidersPanel:
 
 
 def angle_slider(room: Room, name: str, low: float, high: float) -> Any:
-    """A slider for a channel between limits [degrees], at the place where it is made; it shows no value yet."""
+    """Add a slider for a channel, between limits [degrees], to the current GUI container; its value is not set yet."""
     joint = name.split(".", maxsplit=2)[-1] if name.count(".") > 2 else name
     slider = room.server.gui.add_slider(
         joint.removeprefix("left.").removeprefix("right.").replace(".", " "),

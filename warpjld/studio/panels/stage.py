@@ -20,7 +20,7 @@ _CONTACT, _POINT = "#12b886", 8e-4
 
 
 class StagePanel:
-    """Draws what is on stage, and how: shaded or as wires, with or without the skeleton."""
+    """Draws the scene, shaded or as wireframe, with or without skeletons; and its controls."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
@@ -41,7 +41,7 @@ class StagePanel:
 
     @property
     def drawn(self) -> list[Shown]:
-        """What is seen."""
+        """Surfaces that are currently drawn."""
         return [*self._drawn.values()]
 
     def refresh(self) -> None:

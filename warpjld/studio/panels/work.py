@@ -1,4 +1,4 @@
-"""Panel of jobs: run the script, solve its contact, calibrate its skin; shows the results."""
+"""Panel of jobs: run the script, solve its contact, calibrate its skin; and of their results."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class WorkPanel:
         self.open.on_click(lambda _: room.post(self._open))
 
     def refresh(self) -> None:
-        """Show what came of contact."""
+        """Update the results of the contact solve."""
         running = self._room.progress.work.running is not None
         for control in (self.run, self.press, self.fit):
             if control.disabled != running:
@@ -90,7 +90,7 @@ class WorkPanel:
         def show(so_far: Pressed) -> None:
             state.solved, state.coloring = so_far, "pressure"
             last = so_far.surfaces.frames[-1].frame
-            if self._seen in (None, state.frame):  # unless another frame is being looked at
+            if self._seen in (None, state.frame):  # unless the user has moved to another frame
                 state.frame = self._seen = last
 
         def told(result: Pressed) -> None:
@@ -109,7 +109,7 @@ class WorkPanel:
         state = self._room.state
         scene, actor = state.copied_scene(), state.actor
         if actor is None:
-            raise InputError("there is nobody whose skin could be fitted")
+            raise InputError("there is no actor whose skin could be calibrated")
         name, path = actor.name, state.document.path.with_name(f"{state.document.path.stem}-{actor.name.lower()}.json")
 
         def told(losses: tuple[float, float]) -> None:

@@ -84,4 +84,4 @@ PRESSED_COLUMNS = (
     *(Column(f"pressed_area_{part}", "number", "m²", f"Skin of the {part} under pressure.") for part in _PARTS),
     *(Column(f"share_{part}", "number", "", f"Share of the muscles' limits of the {part}.") for part in _PARTS[:-1]),
 )  # fmt: skip
-"""Further columns of a study that solves contact."""
+"""Additional columns of a study that solves contact."""

@@ -1,4 +1,4 @@
-"""Plots of a study that solves contact: forces, areas, pressures and efforts over objects, and maps of pressure."""
+"""Plots of a grasp study with contact: force shares, contact area, pressure, muscle effort, and pressure maps."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ from warpjld.study.grasping.plan import GraspPlan
 __all__ = ["GRIP_SHARES", "finger_shares", "write_grip_plots"]
 
 GRIP_SHARES = {"index": 37.0, "middle": 37.5, "ring": 27.0, "pinky": 13.4}
-"""Published: mean largest forces of the fingers in a grip of 115 ± 13 N [N]."""
+"""Published mean of the fingers' largest forces in a grip of 115 ± 13 N [N]."""
 
 _FINGERS = tuple(GRIP_SHARES)
 _INKS = ("#4d7ea8", "#c8553d", "#6a994e", "#bc8034", "#7b5ea7", "#23272e")
 _COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
 _VIEW = (400, 300)
-"""Width and height of one map in pixels; the scale of colours stands beside the hand."""
+"""Width and height of one pressure map, including the colour scale [pixels]."""
 
 Row = Mapping[str, Any]
 
 
 def finger_shares(rows: Sequence[Row]) -> NDArray[np.float64]:
-    """Share of each of the four fingers in what they press with, index first, shape (n, 4); of rows that press."""
+    """Share of each finger in the total force of the four fingers, index first, shape (n, 4); rows without force are
+    left out."""
     forces = np.array([[row[f"force_{finger}"] or 0.0 for finger in _FINGERS] for row in rows], dtype=np.float64)
     forces = forces.reshape(-1, len(_FINGERS))
     forces = forces[forces.sum(axis=1) > 0.0]
@@ -40,13 +41,13 @@ def finger_shares(rows: Sequence[Row]) -> NDArray[np.float64]:
 def write_grip_plots(
     folder: Path, plan: GraspPlan, rows: Sequence[Row], arrays: Mapping[str, NDArray[Any]]
 ) -> list[Path]:
-    """Write ``grips.png`` and ``pressure.png``, of trials whose force was reached; nothing where there is none.
+    """Write ``grips.png`` and ``pressure.png`` and return their paths; write nothing if no trial reached its force.
 
     Args:
-        folder: Where to.
-        plan: The study's.
-        rows: Its table.
-        arrays: As in ``poses.npz``.
+        folder: Folder to write to.
+        plan: Plan of the study.
+        rows: Rows of the study's table.
+        arrays: Arrays of the study, as in ``poses.npz``.
     """
     pressed = [row for row in rows if row.get("press") == "REACHED"]
     if not pressed:
@@ -63,7 +64,7 @@ def _curves(path: Path, plan: GraspPlan, rows: Sequence[Row]) -> Path:
     FigureCanvasAgg(figure)
     figure.suptitle(f"{plan.title}: {len(rows)} grips")
     axes: Any = figure.subplots(2, 2)
-    objects = [one.name for one in plan.objects]
+    objects = [item.name for item in plan.objects]
     _shares(axes[0, 0], objects, rows)
     _by_hand(axes[0, 1], plan, rows, lambda row: 1e6 * row["pressed_area"], "skin under pressure [mm²]")
     _by_hand(axes[1, 0], plan, rows, lambda row: 1e-3 * row["peak_pressure"], "highest pressure [kPa]")
@@ -79,9 +80,9 @@ def _shares(axis: Any, objects: Sequence[str], rows: Sequence[Row]) -> None:
     places, width = np.arange(len(objects) + 1), 0.2
     means = [finger_shares([row for row in rows if row["object"] == name]) for name in objects]
     known = np.array(list(GRIP_SHARES.values())) / sum(GRIP_SHARES.values())
-    bars = [*(one.mean(axis=0) if len(one) else np.full(len(_FINGERS), np.nan) for one in means), known]
+    bars = [*(shares.mean(axis=0) if len(shares) else np.full(len(_FINGERS), np.nan) for shares in means), known]
     for k, finger in enumerate(_FINGERS):
-        heights = [100.0 * one[k] for one in bars]
+        heights = [100.0 * bar[k] for bar in bars]
         axis.bar(places + (k - 1.5) * width, heights, width, color=_INKS[k], label=finger)
     axis.set_xticks(places, [*objects, "published"])
     axis.set(ylabel="share of the fingers' force [%]", title="Force by finger")
@@ -89,12 +90,12 @@ def _shares(axis: Any, objects: Sequence[str], rows: Sequence[Row]) -> None:
 
 
 def _by_hand(axis: Any, plan: GraspPlan, rows: Sequence[Row], value: Any, label: str) -> None:
-    objects = [one.name for one in plan.objects]
-    for k, hand in enumerate(one.name for one in plan.hands):
+    objects = [item.name for item in plan.objects]
+    for k, hand in enumerate(choice.name for choice in plan.hands):
         mine = [(objects.index(row["object"]), value(row)) for row in rows if row["hand"] == hand]
         shift = 0.08 * (k - 0.5 * (len(plan.hands) - 1))
         places = [at + shift for at, _ in mine]
-        axis.plot(places, [one for _, one in mine], "o", color=_INKS[k % len(_INKS)], label=hand)
+        axis.plot(places, [height for _, height in mine], "o", color=_INKS[k % len(_INKS)], label=hand)
     axis.set_xticks(np.arange(len(objects)), objects)
     axis.set(ylabel=label, ylim=(0.0, None))
     axis.legend(fontsize=8)
@@ -112,7 +113,7 @@ def _efforts(axis: Any, objects: Sequence[str], rows: Sequence[Row]) -> None:
 
 
 def _maps(path: Path, plan: GraspPlan, rows: Sequence[Row], arrays: Mapping[str, NDArray[Any]]) -> Path:
-    """Palms of hands laid flat, in the colours of the highest pressure of all weights; a row a hand."""
+    """Pressure maps of palms of flat hands: maximum over all weights; one row per hand, one column per object."""
     from warpjld.render import ColorScale, grid, save_picture
 
     found = {
@@ -121,7 +122,7 @@ def _maps(path: Path, plan: GraspPlan, rows: Sequence[Row], arrays: Mapping[str,
         for thing in plan.objects
         if (most := _highest(hand.name, thing.name, rows, arrays)) is not None
     }
-    top = max(float(one.max()) for one in found.values())
+    top = max(float(pressure.max()) for pressure in found.values())
     scale = ColorScale(0.0, max(top, 1.0), "contact pressure, kPa", _COLORS, factor=1e-3, highest=True)
     hands = [hand for hand in plan.hands if any(name == hand.name for name, _ in found)]
     things = [thing.name for thing in plan.objects if any(name == thing.name for _, name in found)]
@@ -136,6 +137,7 @@ def _maps(path: Path, plan: GraspPlan, rows: Sequence[Row], arrays: Mapping[str,
 def _highest(
     hand: str, thing: str, rows: Sequence[Row], arrays: Mapping[str, NDArray[Any]]
 ) -> NDArray[np.float64] | None:
+    """Maximum over the trials of the pressure at each vertex [Pa], shape (V,); None without a trial."""
     name = f"{hand}/pressure"
     if name not in arrays:
         return None
@@ -144,7 +146,7 @@ def _highest(
 
 
 def _palm(choice: HandChoice, pressure: NDArray[np.float64] | None, scale: Any) -> NDArray[np.uint8]:
-    """A palm in colours; nothing where nothing is known."""
+    """Picture of the palm coloured by pressure; blank if the pressure is None."""
     if pressure is None:
         return np.full((_VIEW[1], _VIEW[0], 3), 255, dtype=np.uint8)
     from warpjld.render import Camera, SceneRenderer

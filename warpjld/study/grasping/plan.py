@@ -103,7 +103,7 @@ class GraspPlan:
 
     @property
     def combinations(self) -> int:
-        """How many there are."""
+        """Count of combinations of hand, object, scale, friction and weight."""
         kinds = (self.hands, self.objects, self.scales, self.frictions, self._weights)
         return math.prod(len(kind) for kind in kinds)
 
@@ -112,7 +112,7 @@ class GraspPlan:
         return (None,) if self.pressing is None else self.pressing.weights
 
     def weight(self, trial: int) -> float | None:
-        """What hangs on the object in a trial [N]; None where contact is not solved."""
+        """Weight to be held in a trial [N]; None if contact is not solved."""
         return self._weights[trial % len(self._weights)]
 
     def combination(self, trial: int) -> tuple[HandChoice, ObjectChoice, float, float]:
@@ -128,7 +128,7 @@ class GraspPlan:
         del settings["trials"], settings["title"]
         if self.pressing is None:
             del settings["pressing"]
-        if not self.wrist.palm:  # as in studies that were begun before there was such a choice
+        if not self.wrist.palm:  # keeps the identity of studies begun before this setting existed
             del settings["wrist"]["palm"]
         settings["hands"] = [hand.identity() for hand in self.hands]
         settings["objects"] = [thing.identity() for thing in self.objects]

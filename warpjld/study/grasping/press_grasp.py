@@ -1,4 +1,4 @@
-"""A grasp pressed until its digits hold a weight: contact of the hand's flesh with the object (R123)."""
+"""Contact solve of a grasp: digits flex until their force on the object holds a given weight (R123)."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ Array = NDArray[np.float64]
 
 _HAND, _OBJECT = "hand", "object"
 _CLOSING = (0.0, 0.8, 0.95, 1.0, 1.0)
-"""Parts of the way from the open to the closed hand, by frame: contact begins on the last of it."""
+"""Interpolation from the open (0) to the closed hand (1), by frame; contact begins in the last part of it."""
 _CLOSED = 3
-"""Frame at which the hand has closed; the digits have bent on at the next."""
+"""Frame at which the hand is closed; the digits flex further until the next one."""
 _KNUCKLES = ("base", "knuckle2", "knuckle3")
 
 
@@ -48,29 +48,30 @@ def press_grasp(
     weight: float,
     how: ContactPlan,
 ) -> tuple[dict[str, Any], Array | None, str]:
-    """Bend all digits on alike, as ``SQUEEZE … FORCE`` does, until they press with the force that a weight needs.
+    """Flex all digits by the same angle, as ``SQUEEZE … FORCE`` does, until their force is the one that holds a weight.
 
     Args:
-        hand: Whose flesh.
-        thing: What is held; it is rigid and stays where it is.
+        hand: Hand, whose flesh is meshed.
+        thing: Held object; it is rigid and does not move.
         start: Angles of the open hand [rad], shape (J, 4).
-        angles: Those of the closed hand, likewise.
+        angles: Angles of the closed hand [rad], shape (J, 4).
         position: Displacement of the root from rest [m], shape (3,).
-        rotation: Rotation of the root about its rest place, quaternion x, y, z, w.
+        rotation: Rotation of the root about its rest position, quaternion x, y, z, w.
         friction: Coulomb coefficient of skin on object.
-        weight: What is to be held [N].
+        weight: Weight to be held [N].
         how: Settings.
 
     Returns:
-        Columns; contact pressure on the skin's vertices [Pa], shape (V,), None where nothing was solved; a message.
+        Values of the columns by name; contact pressure at the skin's vertices [Pa], shape (V,), None without a
+        solution; and a message, which may be empty.
     """
     asked = how.force(weight, friction)
-    ways = np.array(_CLOSING)[:, None, None] * (angles - start) + start
-    # recorded angles have no turn of the root: the hand stays at rest, and the object stands where the hand sees it
+    closing = np.array(_CLOSING)[:, None, None] * (angles - start) + start
+    # recorded angles have no rotation of the root: the hand stays at rest, the object gets the inverse placement
     back, root = Rotation.from_quat(rotation).inv(), hand.rig.skeleton.rest[0]
     place = {"positions": root - back.apply(root + position), "rotations": back.as_quat()}
     animation = RecordedAnimation(
-        [RecordedActor(_HAND, hand.rig, angles=ways, covering=hand.covering)],
+        [RecordedActor(_HAND, hand.rig, angles=closing, covering=hand.covering)],
         [RecordedObject(_OBJECT, thing.body, **place)],
     )
     try:
@@ -82,14 +83,14 @@ def press_grasp(
         return values, None, found.verdict.text
     last = float(found.frames[-1])
     rows = [row for row in found.rows if row.frame == last and row.actor == _HAND]
-    seen = found.visible_pressure(_HAND, last).pressure[: hand.rig.surface.vertices.shape[0]]
+    pressure = found.visible_pressure(_HAND, last).pressure[: hand.rig.surface.vertices.shape[0]]
     values |= _measured(found, rows)
     reached = values["press"] == ForceStatus.REACHED.name
     values["success"] = reached and how.kept(values["force"], asked=asked)
     message = found.grips[0].text if not values["success"] else ""
     if reached and message:
         message += f"; at the last frame they press with {values['force']:.3g} N"
-    return values, np.asarray(seen), message
+    return values, np.asarray(pressure), message
 
 
 def _specification(hand: Hand, asked: float, friction: float, how: ContactPlan) -> ContactSpecification:
@@ -105,11 +106,12 @@ def _specification(hand: Hand, asked: float, friction: float, how: ContactPlan) 
 
 
 def _ending(found: Simulation) -> str:
-    """How it ended: the grip's own word where all was solved, else the solver's."""
+    """Final status: that of the grip if the solver converged, else that of the solver."""
     return found.grips[0].status if found.grips and found.verdict.status == "CONVERGED" else found.verdict.status
 
 
 def _measured(found: Simulation, rows: list[ContactRow]) -> dict[str, Any]:
+    """Columns measured at the last solved frame; ``rows``: its rows of the contact table."""
     parts = {row.digit: row for row in rows}
     digits = [parts[digit] for digit in DIGITS if digit in parts]
     worst = max(digits, key=lambda row: row.share)

@@ -1,4 +1,4 @@
-"""How the grasps of a study are pressed: weights that hang on the object, and the force that holds each."""
+"""Settings of contact in a grasp study: weights to hold, and the grip force that holds each."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _TOLERANCE = 0.1
 
 @dataclass(frozen=True)
 class ContactPlan:
-    """Contact of flesh and object, solved for every grasp that succeeds; the object is rigid and does not move.
+    """Settings of the contact solve of flesh and object, done for every successful grasp; the object is fixed.
 
     Attributes:
-        weights: What hangs on the object, one a trial in turn [N].
-        margin: The digits press with this many times what friction needs to hold the weight.
+        weights: Weights to hold; trials take them in turn [N].
+        margin: Safety factor: grip force over the least force at which friction holds the weight.
         element: Edge length of the elements of flesh [m].
-        most: Angle by which each joint may bend on [°].
+        most: Largest further flexion of each joint [degrees].
     """
 
     weights: tuple[float, ...]
@@ -28,17 +28,17 @@ class ContactPlan:
     most: float = 20.0
 
     def force(self, weight: float, friction: float) -> float:
-        """Sum of the digits' forces [N] that is asked for: margin · W / μ, since normal forces N in all hold μ N of a
-        weight W along the surface."""
+        """Requested sum of the digits' forces [N]: margin · W / μ, since normal forces with the sum N hold a weight
+        W ≤ μ N along the surface."""
         return self.margin * weight / friction
 
     def kept(self, force: float, *, asked: float) -> bool:
-        """Whether a force at the end is the one asked for [N], within 10 %."""
+        """Whether the final force [N] is within 10 % of the requested one."""
         return abs(force - asked) <= _TOLERANCE * asked
 
 
 def read_pressing(table: TomlTable) -> ContactPlan:
-    """Settings from the table [contact]."""
+    """Read the settings from the table ``[contact]`` of a study's TOML file."""
     table.needed("weights")
     weights = table.numbers("weights", (), above=0.0)
 

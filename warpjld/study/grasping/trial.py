@@ -40,7 +40,7 @@ _SHOWN_PRESSED = ("force", "normal_force", "pressed_area", "peak_pressure", "mus
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A closed hand: open and closed angles (J, 4), place of its root, whether it touches, values by column."""
+    """A closed hand: open and closed angles (J, 4), placement of its root, whether it touches, values by column."""
 
     start: Array
     angles: Array
@@ -77,17 +77,17 @@ class GraspExperiment:
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Those of grasps, and of contact where it is solved."""
+        """Columns of the table: those of grasps, and those of contact if it is solved."""
         return (*GRASP_COLUMNS, *(() if self.settings.pressing is None else PRESSED_COLUMNS))
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Of grasps, or of contact."""
+        """Columns shown in summaries: those of contact if it is solved, else those of grasps."""
         return _SHOWN if self.settings.pressing is None else _SHOWN_PRESSED
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """What a plan combines."""
+        """Columns whose values the plan combines."""
         return (*_GROUPS, *(() if self.settings.pressing is None else ("weight",)))
 
     @property
@@ -193,8 +193,11 @@ class GraspExperiment:
         return Outcome("closed" if tried.touches else "no contact", values, arrays, message)
 
     def _search_seed(self, trial: int, rng: np.random.Generator) -> int:
-        """Seed of a search for the best placement: the trial's own, or where contact is solved the same for all
-        combinations, so that every weight hangs on the same grasp."""
+        """Seed of the search for the best placement.
+
+        It is the trial's own; if contact is solved, it is the same for all combinations, so that all weights are held
+        with the same grasp.
+        """
         if self.settings.pressing is not None:
             rng = generator(self.seed, trial // self.settings.combinations)
         return int(rng.integers(2**31))
@@ -202,7 +205,7 @@ class GraspExperiment:
     def _pressed(
         self, trial: int, hand: Hand, thing: Thing, tried: _Tried, friction: float, success: bool
     ) -> tuple[dict[str, Any], Array | None, str]:
-        """Contact of a grasp that succeeds, where the plan asks for it."""
+        """Contact results of a successful grasp, if the plan requests them; values, pressure and message."""
         how, weight = self.settings.pressing, self.settings.weight(trial)
         if how is None or weight is None or not success:
             return {}, None, ""

@@ -18,7 +18,7 @@ __all__ = ["Approach", "backed_off", "draw_approach", "place_palm", "touch_along
 Array = NDArray[np.float64]
 
 _CLEAR = 5e-4  # the open hand starts at least this far from the object [m]
-_BACKED_OFF = 0.25  # a palm that cannot come nearer than this is not beside the object [m]
+_BACKED_OFF = 0.25  # largest distance by which the hand is moved back [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +95,6 @@ def backed_off(opened: Array, near: NearObject, turn: Array, shift: Array, appro
         nearest = float(near.least((skin + back * approach.direction)[None])[0])
         if nearest >= _CLEAR:
             return back
-        # not nearer than this can it be clear: the object is that deep in the hand
+        # lower bound of the further distance: the object penetrates the hand by this depth
         back += max(_CLEAR - nearest, 1e-4)
     return None

@@ -12,9 +12,9 @@ The border of the stick area is found alike: the reserve of friction, μ p − |
 Mindlin; Johnson 1985, §7.2). As slip depends on the load history, the scale is taken from the next node inwards: the
 ratio of the two reserves is φ(f) / φ(f + 1).
 
-A corner, or an edge, is in contact over less area than its faces have. For a cone or wedge whose flanks stand off by an
-angle β the mean pressure is E* tan β / 2, independent of the force (Sneddon 1948; Johnson 1985, §5.2): force over that
-pressure is the area.
+A corner or an edge is in contact over a smaller area than that of its faces. For a cone or wedge whose flanks make an
+angle β with the other surface, the mean pressure is E* tan β / 2, independent of the force (Sneddon 1948; Johnson 1985,
+§5.2); the area is the force over this pressure.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _ROUNDS = 40
 _POINT = 1e-3
 """Contact area of a pressed node, relative to its tributary area, below which it is taken as that of a cone's tip."""
 _STEEPEST = 0.95
-"""Largest rise of such a flank over its length."""
+"""Largest slope (rise over length) of such a flank."""
 
 
 def contact_modulus(body: Body, interface: Interface) -> Array:
@@ -156,7 +156,7 @@ class ContactArea:
         return whole, np.minimum(self._at_nodes(faces, held, pressed), whole)
 
     def _tips(self, whole: Array, pressure: Array, modulus: Array, slope: Array) -> Array:
-        """Area of what presses as a cone or a wedge, and shows none between nodes [m²], shape (n,); 0 elsewhere."""
+        """Area of contact as of a cone or wedge, where interpolation gives hardly any [m²], shape (n,); else 0."""
         near, area = self._near, self._area
         tip = (pressure > 0.0) & (whole < _POINT * area) & (slope[near] > 0.0)
         mean = 0.5 * modulus[near] * np.where(tip, slope[near], 1.0)
@@ -172,7 +172,7 @@ class ContactArea:
 
 
 def _slopes(nodes: Ints32, rise: Array, count: int) -> Array:
-    """Mean slope of edges from nodes, by their rise over their length, where something is opposite, shape (count,)."""
+    """Mean slope (rise over length) of the edges from each node, where it faces the other side, shape (count,)."""
     seen = np.isfinite(rise)
     sine = np.clip(rise[seen], 0.0, _STEEPEST)
     total = np.bincount(nodes[seen], sine / np.sqrt(1.0 - sine**2), count)

@@ -1,4 +1,4 @@
-"""Nodes of a body that lie in elements of its own: parts of one body that stand in one another."""
+"""Self-penetration test: nodes of a body that lie inside elements of the same body."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ __all__ = ["inside_own"]
 _CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
 )
-_ROUNDS = 8
+_ITERATIONS = 8
 _WITHIN = 1.0 + 1e-6
-"""Natural coordinates that are within: a node on the face between two elements lies in both."""
+"""Largest natural coordinate that counts as inside; a node on the face between two elements lies in both."""
 
 
 def inside_own(x: Array, elements: Ints32, nodes: Ints | Ints32) -> Mask:
-    """Which nodes lie in an element that they are no corner of, shape (n,).
+    """Mask of the nodes that lie in an element they are not a corner of, shape (n,).
 
     Args:
         x: Positions of all nodes [m], shape (N, 3).
         elements: Corners of hexahedra, shape (E, 8).
-        nodes: Those asked for, shape (n,).
+        nodes: Indices of the nodes to test, shape (n,).
     """
     from scipy.spatial import cKDTree
 
@@ -31,9 +31,9 @@ def inside_own(x: Array, elements: Ints32, nodes: Ints | Ints32) -> Mask:
     centres = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
     near = cKDTree(centres).query_ball_point(x[nodes], float(radius.max()))
-    counts = np.array([len(some) for some in near])
+    counts = np.array([len(found) for found in near])
     which = np.repeat(np.arange(len(nodes)), counts)
-    element = np.concatenate([np.asarray(some, dtype=np.int64) for some in near]) if len(which) else which
+    element = np.concatenate([np.asarray(found, dtype=np.int64) for found in near]) if len(which) else which
     at = x[nodes[which]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     slack = 1e-6 * radius[element, None]
@@ -49,10 +49,10 @@ def inside_own(x: Array, elements: Ints32, nodes: Ints | Ints32) -> Mask:
 def _natural(corners: Array, at: Array) -> Array:
     """Natural coordinates of points (n, 3) in hexahedra with corners (n, 8, 3), by Newton's method, shape (n, 3)."""
     place = np.zeros_like(at)
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         shape, slope = shape_at(place), slope_at(place)
         jacobian = np.einsum("nai,nak->nik", corners, slope)
-        left = at - np.einsum("na,nai->ni", shape, corners)
-        step = (np.linalg.pinv(jacobian) @ left[:, :, None])[:, :, 0]  # elements may have no volume
+        residual = at - np.einsum("na,nai->ni", shape, corners)
+        step = (np.linalg.pinv(jacobian) @ residual[:, :, None])[:, :, 0]  # pinv: elements may have no volume
         place = np.clip(place + step, -3.0, 3.0)
     return place

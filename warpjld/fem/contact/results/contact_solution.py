@@ -194,4 +194,4 @@ class ContactError(WarpjldError):
 
 
 class ContactWarning(UserWarning):
-    """Contact that the mesh is too coarse to see: its forces are too low, or follow single faces."""
+    """Warning that the mesh is too coarse to resolve contact: forces are too low, or governed by single faces."""

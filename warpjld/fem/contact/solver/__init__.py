@@ -42,10 +42,10 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
    In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points
    touch, slide and stick in successive iterations, as iterating over Tresca bounds leaves up to 0.7 of the error each
    time. If sticking points change because of that, the bound is taken from the previous solve again.
-   A search whose contact points, searched again, do not agree continues in this phase, at most twice; before that,
-   points are searched again once a node has moved a twentieth of an edge since they were found.
-   At convergence (2), (3) are evaluated once more at the slip found (``confirmed``): what the multipliers took to slide
-   one way may slide another.
+   If the contact points do not agree with those searched again at convergence, iterations continue in this phase, at
+   most twice. Points are also searched again once a node has moved by a twentieth of an edge since the last search.
+   At convergence, (2) and (3) are evaluated once more at the slip found (``confirmed``), since its direction may differ
+   from that of the multipliers.
 6. Bonds whose traction exceeds their strength are broken and the step is solved again; a step that fails is halved.
 
 ``contact_system`` evaluates (2)–(5) for all interfaces, ``contact.law`` for one; ``elastic`` f_int, f_ext and K.

@@ -56,8 +56,8 @@ class LaggedSolver:
     def solve(self, matrix: BlockMatrix, free: Mask, right: Array, nonsymmetric: Any = None) -> Iteration:
         """Solve K11 x = b for the free degrees of freedom, shape (3N,).
 
-        ``nonsymmetric``, ``csr_array`` (3N, 3N), is added to K; the solve is then preconditioned by K. Where K is found
-        not to be positive definite, the status is ``INDEFINITE``.
+        ``nonsymmetric``, ``csr_array`` (3N, 3N), is added to K; the solve is then preconditioned by K. If K is not
+        positive definite, the status is ``INDEFINITE``.
         """
         try:
             return self._solved(matrix, free, right, nonsymmetric)

@@ -30,8 +30,8 @@ _TURNING = 1
 """Iterations after which normals without known derivatives are frozen; weights are updated until gaps no longer change.
 Both are verified at convergence (``confirmed``)."""
 _STALE = 0.025
-"""Movement of a node since the last search for contact points, over the search distance, from which on points are
-searched again: along a curved surface gaps change with its square."""
+"""Motion of a node since the last search for contact points, relative to the search distance, beyond which points are
+searched again: on a curved surface, the error of the gap grows with its square."""
 _FIXED_POINT = 8
 """Iterations of the fixed-point phase."""
 _SAME = 2
@@ -191,7 +191,7 @@ class NewtonState:
         return self._quiet or (self.system.settled(self.contact, self.states, self._negligible) and self._lawful())
 
     def _lawful(self) -> bool:
-        """Whether friction acts against slip: what the multipliers took to slide may slide another way by now."""
+        """Whether friction opposes slip, whose direction may have changed since the multipliers were updated."""
         if not any(t.friction.any() for t in self.contact.tractions):
             return True
         found = self.forces(self.contact.points, self.u, ActiveSet.TRIAL, coupled=self.contact.coupled)
@@ -254,14 +254,14 @@ class NewtonState:
         self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
 
     def points_at(self, u: Array) -> list[ContactPoints]:
-        """Points at displacement u (3N,), as a search that goes there has them: where gaps no longer change by seeing
-        points afresh, those seen last, moved."""
+        """Contact points at displacement u (3N,), as used by a line search: those of the last search, moved, once
+        searching again no longer changes gaps."""
         if not self._settled:
             return self.system.points(u, self.step, self.system.normals(u))
         return self.system.refreshed(self._moved(u), u, self.step)
 
     def _moved(self, u: Array) -> list[ContactPoints]:
-        """The points seen last at displacement u (3N,), by the linear model."""
+        """Contact points of the last search at displacement u (3N,), by the linear model."""
         return [shifted(p, (u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
 
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:

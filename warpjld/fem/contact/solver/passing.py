@@ -60,7 +60,7 @@ class _Side:
 
 
 def _sides(k: int, mortar: Mortar, around: Callable[[ContactSurface], Enclosure]) -> list[_Side]:
-    """Both sides of interface k, with what is around the surface opposite."""
+    """Both sides of interface k, with the neighbourhood of the opposite surface."""
     both = ((mortar.slave, mortar.master), (mortar.master, mortar.slave))
     return [_Side(k, one.nodes, one.edge, around(two), two.nodes, float(np.median(two.edge))) for one, two in both]
 
@@ -107,7 +107,7 @@ class Passing:
         for k, interface, mortar in between:
             if np.isin(piece[mortar.slave.nodes], piece[mortar.master.nodes]).any():
                 self._own.append((interface, mortar))
-                if interface.pair.exclusion is None:  # parts that may overlap are not asked about
+                if interface.pair.exclusion is None:  # parts excluded from contact may overlap
                     self._own_sides += _sides(k, mortar, lambda two: Enclosure(two.quads))
                 continue
             self._sides += _sides(k, mortar, lambda two: enclosure(two.nodes))
@@ -211,8 +211,8 @@ class Passing:
         return worst, which
 
     def _own_depth(self, side: _Side, x: Array, slack: Array) -> tuple[Array, Array]:
-        """How far a side's nodes in elements of their own body lie beyond what may be, and behind the other surface
-        [m], shape (n,) each; 0 for those that lie in none."""
+        """Depth of a side's nodes that lie in elements of their own body: beyond the accepted one, and behind the other
+        surface [m], shape (n,) each; 0 for all other nodes."""
         depth = np.zeros(len(side.nodes))
         inside = np.flatnonzero(inside_own(x, self._elements, side.nodes))
         if len(inside):

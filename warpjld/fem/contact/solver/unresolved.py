@@ -1,8 +1,8 @@
-"""Contact that is finer than the faces that are to see it: a corner or an edge that presses hardly, or not at all.
+"""Detection of penetration that the contact discretisation misses because the mesh is too coarse.
 
-Between two meshes gaps are averages over the faces around a node: a corner that meets a face is seen when it stands
-in it by a share of an edge. Obstacles are met by nodes: an edge of theirs that passes between nodes is not seen. No
-equation says so; distances do.
+Gaps between two meshes are averages over the faces around a node: contact of a corner with a face is detected only once
+it has penetrated by a fraction of an edge. Contact with obstacles is evaluated at nodes: an edge of an obstacle that
+passes between nodes is not detected. The equilibrium equations do not show such penetration, so it is measured here.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from warpjld.fem.contact.solver.passing import Passing
 __all__ = ["unresolved"]
 
 _UNPRESSED, _BESIDE = 0.05, 0.15
-"""Edges by which a node may stand in another body unpressed: where nothing of a pair presses, and where something does:
-faces that do not match stand in one another beside contact by a tenth of an edge."""
+"""Accepted penetration of a node without contact force, in edge lengths: in pairs without any contact, and in pairs
+with contact (non-matching faces penetrate beside the contact area by a tenth of an edge)."""
 _IN_FACE = 0.1
-"""Edges by which an obstacle may stand in a face between its nodes."""
+"""Accepted penetration of an obstacle into a face between its nodes, in edge lengths."""
 _SAMPLES = 4
-"""Places at which a face is looked at, along each of its edges."""
+"""Sample points of a face along each of its edges."""
 
 
 def unresolved(
     rest: Array, interfaces: Sequence[Interface], passing: Passing, instant: ContactInstant, allowed: float
 ) -> list[str]:
-    """What an instant's contact does not see, in words, one for each pair at most.
+    """Warnings about penetration that an instant's contact does not resolve: of the deepest node, and of obstacles.
 
     Args:
         rest: Positions of the bodies' nodes [m], shape (N, 3).
-        interfaces: What may touch.
-        passing: Of these.
+        interfaces: Contact interfaces.
+        passing: Penetration check of the same interfaces.
         instant: The instant.
-        allowed: Share of an overlap at the start that is left: nothing is said of one that is still parted.
+        allowed: Remaining share of the initial overlap; no warnings while it is greater than 0.
     """
     if allowed > 0.0 or not instant.touches:
         return []
     x, out = rest + instant.displacement, []
     touched = [np.flatnonzero(touch.nodal.any(axis=1)) for touch in instant.touches]
-    slack = np.array([_BESIDE if len(some) else _UNPRESSED for some in touched])
+    slack = np.array([_BESIDE if len(nodes) else _UNPRESSED for nodes in touched])
     depth, k = passing.deepest(instant.displacement.reshape(-1), instant.time, touched, slack)
     if depth > 0.0:
         out.append(
@@ -63,24 +63,24 @@ def unresolved(
 
 
 def _between_nodes(interface: Interface, obstacle: Obstacle, x: Array, time: float) -> float:
-    """How deep an obstacle stands in a face between its nodes [m]; 0 where it hardly does.
+    """Greatest penetration of an obstacle into a face between its nodes [m]; 0 if below the accepted one.
 
     Args:
-        interface: A pair with an obstacle.
-        obstacle: It.
+        interface: Interface with the obstacle.
+        obstacle: The obstacle.
         x: Positions of the body's nodes [m], shape (N, 3).
-        time: Of the obstacle.
+        time: Time at which the obstacle's position is evaluated.
     """
     surface, offset = interface.slave, interface.pair.offset
     edge = surface.edge[surface.corners].mean(axis=1)
     near = obstacle.project(x[surface.nodes], time).distance[surface.corners].min(axis=1) < edge
-    some = np.flatnonzero(near)
+    faces = np.flatnonzero(near)
     line = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     r, t = (v.ravel() for v in np.meshgrid(line, line))
     shape = np.stack([(1.0 - r) * (1.0 - t), r * (1.0 - t), r * t, (1.0 - r) * t], axis=1)
-    quads = surface.quads[some]
+    quads = surface.quads[faces]
     at = np.einsum("qk,fki->fqi", shape, x[quads])
     depth = -obstacle.project(at.reshape(-1, 3), time).distance.reshape(at.shape[:2])
     if offset is not None:
         depth += offset[quads] @ shape.T
-    return float(depth[depth > _IN_FACE * edge[some, None]].max(initial=0.0))
+    return float(depth[depth > _IN_FACE * edge[faces, None]].max(initial=0.0))
