@@ -156,11 +156,16 @@ def _lines(names: Callable[[], list[str]], prompt: Callable[[], str], kept: Call
         except UnicodeDecodeError:
             click.echo("error: the line could not be read: it is not valid text", err=True)
             continue
-        except (EOFError, OSError):  # OSError: the terminal is gone
+        except OSError:  # the terminal is gone
+            raise _EndedError from None
+        except EOFError:
             if ended:
                 return
             ended = True
-            click.echo(f"QUIT leaves, or Ctrl-D once more{kept()}", err=True)
+            try:
+                click.echo(f"QUIT leaves, or Ctrl-D once more{kept()}", err=True)
+            except OSError:
+                raise _EndedError from None
             continue
         except Exception as error:  # a history that cannot be read, …
             if read is input:
