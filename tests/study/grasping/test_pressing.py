@@ -118,8 +118,10 @@ def test_a_hand_presses_a_handle(tmp_path: Path) -> None:
     _plan(tmp_path)
     out = tmp_path / "out"
     command = ["study", str(tmp_path / "plan.toml"), "-o", str(out)]
-    main([*command, "--processes", "1", "--table", "csv", "--quiet"], standalone_mode=False)
-    (row,) = read_table(out / "table.csv")
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--processes", "1", "--quiet"])
+    assert ended.value.code == 0
+    (row,) = read_table(out / "table.parquet")
     assert (row["press"], row["success"], row["asked_force"]) == ("REACHED", True, 12.5)
     assert row["force"] == pytest.approx(12.5, rel=0.05)  # at the last frame, not in the search alone
     digits = ("thumb", "index", "middle", "ring", "pinky")
@@ -133,6 +135,8 @@ def test_a_hand_presses_a_handle(tmp_path: Path) -> None:
     assert (out / "grips.png").exists()
     assert (out / "pressure.png").exists()
 
-    main([*command, "--rerun", "0", "--quiet"], standalone_mode=False)
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--rerun", "0", "--quiet"])
+    assert ended.value.code == 0
     again = json.loads((out / "rerun" / "0" / "row.json").read_text())
     assert again["differences"] == []
