@@ -115,7 +115,7 @@ def test_plots_of_grips(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_hand_presses_a_handle(tmp_path: Path) -> None:
-    _plan(tmp_path)
+    _plan(tmp_path, "0.008", "0.006")  # m; coarser elements leave too little flesh over the bones
     out = tmp_path / "out"
     command = ["study", str(tmp_path / "plan.toml"), "-o", str(out)]
     with pytest.raises(SystemExit) as ended:
