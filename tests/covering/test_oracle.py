@@ -43,8 +43,8 @@ ORACLES = {"smooth": smooth_points, "paper": paper_points}
 def error(rig: Rig, method: Literal["smooth", "paper"]) -> float:
     """Largest distance from the oracle, relative to the surface's size."""
     covering = bind(rig.skeleton, rig.surface, method=method)
-    poses = random_poses(covering.skeleton, 8, 3, twist=0.4)
-    vertices = sample(covering, 8, 5)
+    poses = random_poses(covering.skeleton, 6, 3, twist=0.4)
+    vertices = sample(covering, 5, 5)
     wanted = ORACLES[method](covering, poses, vertices)
     return float(np.abs(covering.deform(poses)[:, vertices] - wanted).max()) / covering.surface.size
 
