@@ -108,7 +108,7 @@ def test_random_poses_cross_no_more_than_before(name: str, kind: str) -> None:
     """Poses that nothing was chosen by: no more crossing faces in all, and hardly more in any. Where a finger is in the
     palm too deep to be parted, opening its own joint moves the line of their crossing to other faces."""
     covering, touch = bound(name)
-    before, after = crossing_before_and_after(covering, touch, random_angles(covering.skeleton, kind, 8, seed=7)).T
+    before, after = crossing_before_and_after(covering, touch, random_angles(covering.skeleton, kind, 12, seed=7)).T
     assert after.sum() <= before.sum()
     assert (after <= before + np.maximum(3, before / 20)).all(), (before, after)
     assert (after > before).sum() <= 2
