@@ -5,16 +5,16 @@ from __future__ import annotations
 import pytest
 
 from warpjld.baking import Baked, bake, training_poses
-from warpjld.covering import Covering, bind_rig
-from warpjld.hand import build_hand
+from warpjld.covering import Covering
+from warpjld.rig import Rig
 
 
 @pytest.fixture(scope="session")
-def covering() -> Covering:
-    return bind_rig(build_hand("left", resolution=1500))
+def covering(bound: Covering) -> Covering:
+    return bound
 
 
 @pytest.fixture(scope="session")
-def baked(covering: Covering) -> Baked:
-    rig = build_hand("left", resolution=1500)
+def baked(covering: Covering, hands: dict[str, Rig]) -> Baked:
+    rig = hands["left"]
     return bake(rig, covering, training_poses(rig.skeleton), correctives=16)

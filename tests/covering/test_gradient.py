@@ -26,13 +26,13 @@ POSE = {
 
 
 class Case:
-    """Six vertices of every operator, two poses, a random adjoint and the oracle's value of their product."""
+    """Four vertices of every operator, two poses, a random adjoint and the oracle's value of their product."""
 
     def __init__(self, covering: Covering) -> None:
         rng = np.random.default_rng(4)
         strongest = covering.domains.argmax(axis=1)
         pools = [np.flatnonzero(strongest == f) for f in range(len(covering.fans))]
-        self.vertices = np.concatenate([rng.choice(p, min(len(p), 6), replace=False) for p in pools if len(p)])
+        self.vertices = np.concatenate([rng.choice(p, min(len(p), 4), replace=False) for p in pools if len(p)])
         self.covering = covering
         self.poses = random_poses(covering.skeleton, 2, 7)
         self.oracle = oracle.Diffused(covering)
@@ -121,9 +121,9 @@ def test_misuse_is_named(bound: Covering) -> None:
 
 
 def _directions(rng: np.random.Generator, gradient: np.ndarray) -> list[np.ndarray]:
-    """Three random directions, and the single entries that matter most."""
-    out = [rng.normal(size=gradient.shape) for _ in range(3)]
-    for flat in np.argsort(-np.abs(gradient).ravel())[:3]:
+    """Two random directions, and the single entries that matter most."""
+    out = [rng.normal(size=gradient.shape) for _ in range(2)]
+    for flat in np.argsort(-np.abs(gradient).ravel())[:2]:
         one = np.zeros(gradient.size)
         one[flat] = 1.0
         out.append(one.reshape(gradient.shape))

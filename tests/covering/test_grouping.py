@@ -14,7 +14,7 @@ from warpjld.covering import bind
 from warpjld.covering.grouping import FIXED, group, work
 from warpjld.covering.runs import Columns, pack
 from warpjld.geometry.surface import Surface
-from warpjld.hand import build_hand
+from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, poses_from_angles
 
 
@@ -76,9 +76,11 @@ def test_packed_runs_give_back_every_coefficient(count: int) -> None:
     np.testing.assert_array_equal(offsets, offset)
 
 
-def test_rows_written_through_the_buffer_are_those_of_the_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_written_through_the_buffer_are_those_of_the_runs(
+    hands: dict[str, Rig], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Blocks of frames that do not divide the batch, rows at any address, and a surface smaller than one tile."""
-    hand = build_hand("left", resolution=1500)
+    hand = hands["left"]
     faces = np.array([[0, 1, 2], [2, 3, 4], [4, 5, 6]], dtype=np.int32)
     few = Surface(hand.surface.vertices[:7], faces, np.arange(7, dtype=np.int32), faces)
     monkeypatch.setattr("warpjld.covering.launch._BUFFERED", 1)

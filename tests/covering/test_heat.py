@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from warpjld.covering.heat import DiffusionFactor, conducting_laplacian, solve_diffusion
-from warpjld.hand import build_hand
+from warpjld.rig import Rig
 
 
 def _matrix(count: int, seed: int, pieces: int = 1) -> np.ndarray:
@@ -34,8 +34,8 @@ def test_solutions_are_those_of_a_dense_solver(count: int, columns: int, pieces:
     np.testing.assert_allclose(scale[:, None] * found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-def test_several_steps_at_once_are_one_after_another() -> None:
-    hand = build_hand("left", resolution=1500).surface
+def test_several_steps_at_once_are_one_after_another(built: Rig) -> None:
+    hand = built.surface
     conductivity = np.random.default_rng(0).uniform(0.5, 2.0, len(hand.vertices)) * 1e-5
     laplacian, area = conducting_laplacian(hand.vertices, hand.faces, np.full(len(hand.vertices), 0.01), conductivity)
     factor = DiffusionFactor(sp.csr_array(sp.diags_array(area) + laplacian))

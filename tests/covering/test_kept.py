@@ -20,14 +20,13 @@ from warpjld.covering.parameters import default_parameters
 from warpjld.errors import InputError
 from warpjld.files.kept_files import CACHE_VARIABLE
 from warpjld.files.whole_file import whole_file
-from warpjld.hand import build_hand
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
 
 
 @pytest.fixture(scope="module")
-def hand() -> Rig:
-    return build_hand("left", resolution=1500)
+def hand(hands: dict[str, Rig]) -> Rig:
+    return hands["left"]
 
 
 @pytest.fixture
@@ -137,7 +136,10 @@ def test_a_cache_that_cannot_be_written_is_none(hand: Rig, monkeypatch: pytest.M
     assert bind_kept(hand)[0].skeleton is hand.skeleton
 
 
-def test_bind_and_deform_with_what_it_wrote(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bind_and_deform_with_what_it_wrote(
+    hands: dict[str, Rig], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("warpjld.hand.kept.kept_hand", lambda side, **_: hands[side])
     monkeypatch.setenv(CACHE_VARIABLE, "off")
     kept, motion = tmp_path / "hand.npz", tmp_path / "motion.csv"
     made = CliRunner().invoke(bind_command, ["builtin:left", "-o", str(kept)])

@@ -7,7 +7,7 @@ import importlib.util
 from pathlib import Path
 
 from warpjld.covering.kept_key import binding_key, binding_sources
-from warpjld.hand import build_hand
+from warpjld.rig import Rig
 
 _PACKAGES = ("warpjld", "warpjld_kernels")
 _ROOTS = ("warpjld.covering.surface_binding", "warpjld.covering.kept")
@@ -52,8 +52,8 @@ def test_every_module_that_binding_runs_through_counts() -> None:
     assert missing <= set(_PACKAGES), f"binding imports {sorted(missing)}, of which kept_key.py knows nothing"
 
 
-def test_all_that_is_given_counts() -> None:
-    hand = build_hand("left", resolution=1500)
+def test_all_that_is_given_counts(hands: dict[str, Rig]) -> None:
+    hand = hands["left"]
     assert binding_key(hand) == binding_key(hand)
-    assert binding_key(hand) != binding_key(build_hand("right", resolution=1500))
+    assert binding_key(hand) != binding_key(hands["right"])
     assert binding_key(hand) != binding_key(hand, domains="skin")

@@ -43,8 +43,8 @@ ORACLES = {"smooth": smooth_points, "paper": paper_points}
 def error(rig: Rig, method: Literal["smooth", "paper"]) -> float:
     """Largest distance from the oracle, relative to the surface's size."""
     covering = bind(rig.skeleton, rig.surface, method=method)
-    poses = random_poses(covering.skeleton, 8, 3, twist=0.4)
-    vertices = sample(covering, 8, 5)
+    poses = random_poses(covering.skeleton, 6, 3, twist=0.4)
+    vertices = sample(covering, 5, 5)
     wanted = ORACLES[method](covering, poses, vertices)
     return float(np.abs(covering.deform(poses)[:, vertices] - wanted).max()) / covering.surface.size
 
@@ -54,7 +54,6 @@ def test_built_in_hand(built: Rig, method: Literal["smooth", "paper"]) -> None:
     assert error(built, method) < RELATIVE
 
 
-@pytest.mark.parametrize("method", ["smooth", "paper"])
-@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize(("side", "method"), [("right", "smooth"), ("left", "paper")])
 def test_webxr_hand(webxr_hands: dict[str, Rig], side: str, method: Literal["smooth", "paper"]) -> None:
     assert error(webxr_hands[side], method) < RELATIVE

@@ -85,11 +85,9 @@ def test_wrong_files_are_named(built: Rig, tmp_path: Path, content: str, says: s
     assert says in str(caught.value)
 
 
-def test_the_thumbs_base_counts_by_its_whole_swing() -> None:
+def test_the_thumbs_base_counts_by_its_whole_swing(built: Rig) -> None:
     """It flexes little and swings far: by its flexion alone nothing of the thumb's ball would swell."""
-    from warpjld.hand import build_hand
-
-    skeleton = build_hand("left").skeleton
+    skeleton = built.skeleton
     inflation = default_parameters(skeleton).inflation
     thumb, finger = (skeleton.index(f"left.{name}") for name in ("thumb.base", "index.carpometacarpal"))
     flexion, abduction = skeleton.limits[thumb, [0, 3], 1]

@@ -17,7 +17,6 @@ from warpjld.skeleton import CHANNELS, poses_from_angles
 
 BODIES = (
     "body_anny/body_104joints.glb",
-    "body_anny/body_lowpoly_163joints.glb",
     "body_mesh2motion_mannequin/human-male.glb",
 )
 

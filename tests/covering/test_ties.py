@@ -16,7 +16,6 @@ from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.segment_table import SegmentTable
 from warpjld.geometry.surface import Surface
-from warpjld.hand import build_hand
 from warpjld.rig import Rig
 from warpjld.skeleton import Skeleton
 
@@ -120,8 +119,8 @@ def test_multigrid_does_not_depend_on_what_was_drawn_before(monkeypatch: pytest.
     assert np.array_equal(bind(skeleton, surface).domains, first)
 
 
-def test_heat_does_not_depend_on_the_order_its_equations_are_solved_in() -> None:
-    hand = build_hand("left", resolution=1500).surface
+def test_heat_does_not_depend_on_the_order_its_equations_are_solved_in(built: Rig) -> None:
+    hand = built.surface
     laplacian, area = heat.cotangent_laplacian(hand.vertices, hand.faces, np.full(len(hand.vertices), 0.01))
     right = np.random.default_rng(0).random((len(area), 3)) * area[:, None]
     order = heat.spatial_order(hand.vertices)

@@ -48,8 +48,15 @@ def below_the_palm(covering, poses, thing) -> Places:
     return Places.of(under - [0, high, 0])
 
 
-@pytest.mark.parametrize("coupling", [None, (1.0, 0.7)])
-@pytest.mark.parametrize("make", [lambda: ball(0.065), lambda: cylinder(0.05, 0.2), lambda: box(0.05, 0.05, 0.05)])
+@pytest.mark.parametrize(
+    ("make", "coupling"),
+    [
+        (lambda: ball(0.065), None),
+        (lambda: cylinder(0.05, 0.2), (1.0, 0.7)),
+        (lambda: box(0.05, 0.05, 0.05), None),
+        (lambda: box(0.05, 0.05, 0.05), (1.0, 0.7)),
+    ],
+)
 def test_digits_touch_and_do_not_enter(covering, open_hand, make, coupling) -> None:
     poses, angles = open_hand
     thing = make()

@@ -22,14 +22,9 @@ MESHES = [
     "hand_anny/left.glb",  # open at the wrist
     "hand_webxr_generic/right.glb",
     "mujoco_mug/mug.obj",
-    "pingpong_ball/ping_pong_ball.glb",
     "robosuite_can_lemon_bread/bread.obj",
-    "robosuite_can_lemon_bread/can.obj",
     "robosuite_can_lemon_bread/can.stl",  # open edges
-    "robosuite_can_lemon_bread/lemon.obj",
     "ycb_mustard_bottle/ycb_mustard_bottle.glb",
-    "ycb_potted_meat_can/ycb_potted_meat_can.glb",
-    "ycb_sugar_box/ycb_sugar_box.glb",
 ]
 
 

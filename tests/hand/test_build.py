@@ -50,7 +50,7 @@ def check_closed(rig: Rig) -> None:
     assert len(rig.surface.weld) == len(rig.surface.vertices), "nothing to weld"
 
 
-@pytest.mark.parametrize("resolution", [2_000, 5_000, 40_000, 300_000])
+@pytest.mark.parametrize("resolution", [5_000, 40_000, pytest.param(300_000, marks=pytest.mark.slow)])
 def test_closed_and_as_many_vertices_as_asked(resolution: int) -> None:
     rig = build_hand(resolution=resolution)
     check_closed(rig)
@@ -90,7 +90,7 @@ def test_volume_of_hand_and_stub(hand: Rig) -> None:
     assert 350e-6 < volume < 450e-6
 
 
-@pytest.mark.parametrize(("length", "ratio"), [(0.15, 0.50), (0.18, 0.39), (0.23, 0.44)])
+@pytest.mark.parametrize(("length", "ratio"), [(0.15, 0.50), (0.23, 0.39)])
 def test_length_and_breadth_as_asked(length: float, ratio: float) -> None:
     rig = build_hand(length=length, breadth=ratio * length, resolution=2000)
     assert -rig.surface.vertices[:, 2].min() == pytest.approx(length, rel=SIZE_TOLERANCE)

@@ -32,9 +32,10 @@ def _alike(one: object, other: object) -> bool:
     return one == other
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_it_is_the_one_that_was_built(folder: Path, side: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    built: Rig = build_hand(side, resolution=1500, length=0.18)
+def test_it_is_the_one_that_was_built(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    side = "right"
+    built = build_hand(side, resolution=1500, length=0.18)
+    monkeypatch.setattr("warpjld.hand.kept.build_hand", lambda *_, **__: built)
     assert _alike(kept_hand(side, resolution=1500, length=0.18), built)
 
     def refuse(*_: object, **__: object) -> None:
@@ -47,12 +48,24 @@ def test_it_is_the_one_that_was_built(folder: Path, side: str, monkeypatch: pyte
             kept_hand(side, **other)
 
 
-def test_a_broken_file_is_made_anew_and_bad_measures_are_refused(folder: Path) -> None:
+def test_a_broken_file_is_made_anew_and_bad_measures_are_refused(
+    folder: Path, hands: dict[str, Rig], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(InputError, match="length"):
+        kept_hand(length=3.0)
+    assert not list(folder.iterdir())
+    made = []
+
+    def again(side: str, **options: object) -> Rig:
+        assert options == {"resolution": 1500}
+        made.append(side)
+        return hands[side]
+
+    monkeypatch.setattr("warpjld.hand.kept.build_hand", again)
     whole = kept_hand(resolution=1500)
     (file,) = folder.iterdir()
     for broken in (b"", b"no hand", file.read_bytes()[:2000]):
         file.write_bytes(broken)
         assert _alike(kept_hand(resolution=1500), whole)
-    with pytest.raises(InputError, match="length"):
-        kept_hand(length=3.0)
+    assert made == ["left"] * 4
     assert list(folder.iterdir()) == [file]

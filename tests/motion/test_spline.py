@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -23,6 +23,7 @@ def keys(draw: st.DrawFn, least: int = 1) -> tuple[np.ndarray, np.ndarray]:
     return np.cumsum(gaps), draw(arrays(float, count, elements=values))
 
 
+@settings(max_examples=40)
 @given(keys(), constants, constants, constants)
 def test_goes_through_its_keys_and_holds_outside(data: tuple, t: float, c: float, b: float) -> None:
     spline = Spline(*data, t, c, b)
@@ -30,6 +31,7 @@ def test_goes_through_its_keys_and_holds_outside(data: tuple, t: float, c: float
     np.testing.assert_allclose(spline([data[0][0] - 5, data[0][-1] + 5]), data[1][[0, -1]], atol=EXACT)
 
 
+@settings(max_examples=40)
 @given(keys(least=3), constants, constants)
 def test_speed_is_continuous_where_continuity_is_zero(data: tuple, t: float, b: float) -> None:
     spline = Spline(*data, tension=t, bias=b)
@@ -46,6 +48,7 @@ def test_continuity_makes_a_corner() -> None:
         assert jump == pytest.approx(continuity * 2.0 / 1.5), "c times twice the chord, over the mean interval"
 
 
+@settings(max_examples=40)
 @given(keys(least=2), st.floats(-3, 3), st.floats(-5, 5))
 def test_a_line_stays_a_line_however_keys_are_spaced(data: tuple, slope: float, start: float) -> None:
     times = data[0]
@@ -54,6 +57,7 @@ def test_a_line_stays_a_line_however_keys_are_spaced(data: tuple, slope: float, 
     np.testing.assert_allclose(got, start + slope * dense, atol=1e-8)
 
 
+@settings(max_examples=40)
 @given(keys(), constants, constants, constants, st.floats(0.25, 4), st.floats(-3, 3))
 def test_affine_invariance(data: tuple, t: float, c: float, b: float, scale: float, shift: float) -> None:
     times, key_values = data
@@ -63,6 +67,7 @@ def test_affine_invariance(data: tuple, t: float, c: float, b: float, scale: flo
     np.testing.assert_allclose(moved, shift - 2.5 * plain, atol=1e-8)
 
 
+@settings(max_examples=40)
 @given(arrays(float, 5, elements=values))
 def test_is_catmull_rom_on_even_keys(key_values: np.ndarray) -> None:
     spline = Spline(np.arange(5.0), key_values, hold=False)

@@ -54,7 +54,7 @@ def at(rig: Rig, joint: int):
     return next(c for c in joint_centres(rig.skeleton, rig.surface.vertices, rig.surface.faces) if c.joint == joint)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 @given(
     away=st.floats(0.0, 0.75),
     way=st.floats(0.0, 6.28),

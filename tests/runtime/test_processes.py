@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from warpjld.files.whole_file import whole_file
+from warpjld.runtime import processes
 from warpjld.runtime.processes import run_jobs
 
 
@@ -78,7 +79,10 @@ class Deadly(Sleep):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_workers_that_do_not_heed_being_ended_are_not_waited_for(tmp_path: Path) -> None:
+def test_workers_that_do_not_heed_being_ended_are_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(processes, "_PATIENCE", 0.5)
     statuses = {}
     began = time.monotonic()
     run_jobs(Deadly(tmp_path), [0, 1], processes=2, done=statuses.__setitem__)
@@ -100,6 +104,7 @@ def test_a_worker_started_while_others_are_ended_is_not_waited_for(
             kill(process)
 
     monkeypatch.setattr(BaseProcess, "terminate", missed)
+    monkeypatch.setattr(processes, "_PATIENCE", 0.5)
     statuses = {}
     run_jobs(Deadly(tmp_path), [0, 1], processes=2, done=statuses.__setitem__)
     assert statuses == {0: "done", 1: "crashed"}

@@ -38,7 +38,7 @@ def _places(skeleton: Skeleton, count: int) -> np.ndarray:
 
 def test_places_that_can_be_reached_are_reached_inside_the_limits() -> None:
     skeleton = body()
-    for place in _places(skeleton, 6):
+    for place in _places(skeleton, 3):
         arm, found, poses = _reach(skeleton, "left", place)
         # by the ordinary kinematics, not by those that the search goes by
         assert np.linalg.norm(poses.positions[0, arm.joints[-1]] - place) < 1e-5
@@ -59,6 +59,7 @@ def test_both_arms_reach_alike() -> None:
     assert np.allclose(mirrored[skeleton.index("left.wrist")], skeleton.rest[skeleton.index("right.wrist")])
     place = np.array([0.2, 1.2, 0.35])
     arm, left, _ = _reach(skeleton, "left", place)
+    assert left.off == 0.0  # there are no aims
     other, right, _ = _reach(skeleton, "right", place * [-1.0, 1.0, 1.0])
     np.testing.assert_allclose(other.values(right.angles), arm.values(left.angles), atol=1e-4)
 
@@ -101,8 +102,6 @@ def test_the_palm_looks_where_it_is_to_look() -> None:
     _, found, _ = _reach(skeleton, "left", np.array([0.35, 1.1, 0.25]), aims=((_PALM, look),))
     assert found.short < 1e-4
     assert np.degrees(found.off) < 25.0
-    _, free, _ = _reach(skeleton, "left", np.array([0.35, 1.1, 0.25]))
-    assert free.off == 0.0
 
 
 def test_a_hand_comes_to_a_place_with_its_rotation() -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.hand import build_hand
-from warpjld.hand.figure import build_body
+from warpjld.rig import Rig
 from warpjld.skeleton.segments import segment_joints
 
 
-def test_segments_of_the_body() -> None:
-    skeleton = build_body().skeleton
+def test_segments_of_the_body(figure: Rig) -> None:
+    skeleton = figure.skeleton
 
     def names(segment: str) -> set[str]:
         return {skeleton.names[joint] for joint in segment_joints(skeleton, segment)}
@@ -32,8 +31,8 @@ def test_segments_of_the_body() -> None:
     assert len(every) == len(set(every)) == sum(bool(kids) for kids in skeleton.children)
 
 
-def test_a_hand_has_a_forearm_and_no_shin() -> None:
-    skeleton = build_hand("left", resolution=1500).skeleton
+def test_a_hand_has_a_forearm_and_no_shin(hands: dict[str, Rig]) -> None:
+    skeleton = hands["left"].skeleton
     assert segment_joints(skeleton, "left.forearm") == [skeleton.names.index("left.forearm")]
     with pytest.raises(InputError, match=r"no segment 'left\.shin'"):
         segment_joints(skeleton, "left.shin")

@@ -44,10 +44,15 @@ def test_points_turn_and_scale_with_the_surface(figure, placed):
         np.testing.assert_allclose(moved[name], 100.0 * turn @ place + 30.0, atol=3.0, err_msg=name)
 
 
+@pytest.fixture(scope="module")
+def whole(hands):
+    """Points of both hands, in metres."""
+    return {side: propose_points(rig.surface.vertices, rig.surface.faces) for side, rig in hands.items()}
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_a_hand_gets_its_25_points_and_its_side(hands, side):
-    rig = hands[side]
-    points = propose_points(rig.surface.vertices, rig.surface.faces)
+def test_a_hand_gets_its_25_points_and_its_side(hands, whole, side):
+    rig, points = hands[side], whole[side]
     assert tuple(points) == hand_joint_names(side)
     off = [np.linalg.norm(p - rig.skeleton.rest[rig.skeleton.names.index(name)]) for name, p in points.items()]
     assert np.mean(off) < 0.008
@@ -93,7 +98,7 @@ def test_what_is_placed_is_written_and_loads_as_it_is(hands, tmp_path):
     surface, file = tmp_path / "hand.obj", tmp_path / "points.json"
     hand = hands["right"].surface
     trimesh.Trimesh(hand.vertices, hand.faces, process=False).export(surface)
-    result = CliRunner().invoke(place_command, [str(surface), "-o", str(file)])
+    result = CliRunner().invoke(place_command, [str(surface), "-o", str(file), "--side", "right"])
     assert result.exit_code == 0, result.output
     rig = load_rig(surface, points=file)
     wanted = json.loads(file.read_text())["points"]
@@ -104,21 +109,21 @@ def test_what_is_placed_is_written_and_loads_as_it_is(hands, tmp_path):
 
 def test_what_is_neither_body_nor_hand_is_refused(tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3)
+    ball.apply_scale([0.1, 1.0, 0.1])
     with pytest.raises(InputError, match=r"no upright body .*; and no hand"):
         propose_points(ball.vertices, ball.faces)
     flat = np.array([[0.0, 0, 0], [0, 0, 0], [0, 0, 0]])
     with pytest.raises(InputError, match="has no triangles, or no extent"):
         propose_points(flat, np.array([[0, 1, 2]]))
-    mitten = trimesh.creation.capsule(height=0.1, radius=0.04)
+    mitten = trimesh.creation.capsule(height=0.1, radius=0.006)
     with pytest.raises(InputError, match="spread the fingers"):
         propose_points(mitten.vertices, mitten.faces, side="left")
 
 
-def test_units_of_length_mean_nothing(hands):
+def test_units_of_length_mean_nothing(hands, whole):
     rig = hands["left"]
-    small = propose_points(rig.surface.vertices * 1e-3, rig.surface.faces)
-    whole = propose_points(rig.surface.vertices, rig.surface.faces)
-    for name in whole:
-        np.testing.assert_allclose(1e3 * small[name], whole[name], atol=3e-3)
-    forward = unit(whole["left.middle.tip"] - whole["left.wrist"])
+    small = propose_points(rig.surface.vertices * 1e-3, rig.surface.faces, side="left")
+    for name in whole["left"]:
+        np.testing.assert_allclose(1e3 * small[name], whole["left"][name], atol=3e-3)
+    forward = unit(whole["left"]["left.middle.tip"] - whole["left"]["left.wrist"])
     assert forward @ (0, 0, -1) > 0.9

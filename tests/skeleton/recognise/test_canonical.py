@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from warpjld.errors import InputError
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.rig import Rig
 from warpjld.skeleton import hand_joint_names
 from warpjld.skeleton.recognise.canonical import canonical_skeleton
@@ -18,7 +18,7 @@ from warpjld.skeleton.recognise.tree import SourceTree
 
 @cache
 def coarse(side: str) -> Rig:
-    return build_hand(side, resolution=1500)
+    return kept_hand(side, resolution=1500)
 
 
 def tree(names: list[str], parents: list[int], places: np.ndarray) -> SourceTree:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import pyvista as pv
 
 from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
@@ -29,6 +30,15 @@ def check_named(rig, joint, offset, within):
     assert np.linalg.norm(offset + 1e-3 * np.array(found.proposal)) < within * np.linalg.norm(offset)
 
 
+@pytest.fixture(scope="module")
+def light(figure):
+    """The built-in body with a quarter of its triangles."""
+    mesh = pv.PolyData.from_regular_faces(figure.surface.vertices, figure.surface.faces)
+    mesh = mesh.decimate_pro(0.75, preserve_topology=True)
+    surface = replace(figure.surface, vertices=np.asarray(mesh.points, dtype=np.float64), faces=mesh.regular_faces)
+    return replace(figure, surface=surface)
+
+
 def test_the_built_in_actors_are_well_placed(figure, hands):
     for rig in (figure, *hands.values()):
         assert check_placing(rig.skeleton, rig.surface.vertices, rig.surface.faces) == ()
@@ -49,8 +59,8 @@ def test_the_built_in_actors_are_well_placed(figure, hands):
         ("head.top", (0.0, -0.05, 0.0), 0.9),
     ],
 )
-def test_joints_of_a_body(figure, joint, offset, within):
-    check_named(figure, joint, np.array(offset), within)
+def test_joints_of_a_body(light, joint, offset, within):
+    check_named(light, joint, np.array(offset), within)
 
 
 @pytest.mark.parametrize("digit", ["index", "middle", "ring", "pinky"])
