@@ -12,6 +12,7 @@ import pytest
 from hypothesis import settings
 
 from tests.glb_files import hand_glb, write_glb  # noqa: F401
+from warpjld.hand.kept import kept_hand
 from warpjld.rig import Rig
 
 if TYPE_CHECKING:
@@ -77,6 +78,4 @@ def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @cache
 def _built(side: str, **options: float) -> Rig:
-    from warpjld.hand.build import build_hand
-
-    return build_hand(side, **options)
+    return kept_hand(side, **options)
