@@ -3,12 +3,14 @@
 import csv
 import runpy
 from dataclasses import replace
+from functools import partial
 from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from warpjld import FleshMaterial
 from warpjld.cli import main
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.hand.kept import kept_hand
@@ -241,7 +243,8 @@ def test_python_api(tmp_path, capsys) -> None:
     assert "31 frames" in capsys.readouterr().out
 
 
-def test_python_contact(capsys) -> None:
+def test_python_contact(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpjld.FleshMaterial", partial(FleshMaterial, element=0.004))
     names = runpy.run_path(str(EXAMPLES / "python_contact.py"))
     found = names["found"]
     assert found.solved.status.name == "CONVERGED"

@@ -73,7 +73,7 @@ def test_what_is_out_of_reach_is_said_with_the_distance(anny: Scene) -> None:
     scene = _fresh(anny)
     told: list[str] = []
     scene.warn = told.append
-    Interpreter(scene).run_text("REACH 0 20 LEFT AT 0.3 0.3 2.5")
+    Interpreter(scene).run_text("REACH 0 20 LEFT AT 0.3 0.3 2.5 WITH WRIST")
     (attempt,) = scene.attempts
     assert attempt.status == "SHORT"
     assert "out of reach" in told[0]
