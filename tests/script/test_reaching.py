@@ -69,11 +69,12 @@ def test_the_palm_lies_on_an_object(anny: Scene) -> None:
     assert 0.03 < nearest < 0.043
 
 
-def test_what_is_out_of_reach_is_said_with_the_distance(anny: Scene) -> None:
+def test_what_is_out_of_reach_is_said_with_the_distance(anny: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpjld.skeleton.reach._STARTS", 1)
     scene = _fresh(anny)
     told: list[str] = []
     scene.warn = told.append
-    Interpreter(scene).run_text("REACH 0 20 LEFT AT 0.3 0.3 2.5 WITH WRIST")
+    Interpreter(scene).run_text("REACH 0 20 LEFT AT 0.3 0.3 2.5")
     (attempt,) = scene.attempts
     assert attempt.status == "SHORT"
     assert "out of reach" in told[0]
