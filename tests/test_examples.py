@@ -3,21 +3,25 @@
 import csv
 import runpy
 from dataclasses import replace
+from functools import partial
 from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from warpjld import FleshMaterial
 from warpjld.cli import main
 from warpjld.fem.contact.obstacles.facets import Facets
+from warpjld.hand.kept import kept_hand
+from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene, all_commands
 from warpjld.script.outputs import Picture
 from warpjld.script.plugin import load_commands
 from warpjld.script.runner import run_scene
 from warpjld.skeleton import DIGITS
 
-pytestmark = pytest.mark.usefixtures("quick_hands")
+pytestmark = pytest.mark.usefixtures("coarse_hands")
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 SCRIPTS = [
@@ -28,10 +32,27 @@ SCRIPTS = [
 PRESSED = sorted(path.name for path in EXAMPLES.glob("press_*.jld"))
 
 
-def run_small(name: str, out: Path, frames: tuple[int, int] | None = None) -> dict:
-    """Run a script of the examples in small pictures, and these frames only."""
+@pytest.fixture
+def coarse_hands(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Built-in hands are built once a session; coarse, where a test is not of their sizes and forces."""
+    if request.node.get_closest_marker("slow"):
+        request.getfixturevalue("quick_hands")
+        return
+
+    def coarse(side: str = "left", resolution: int = 1500, **options: float) -> Rig:
+        return kept_hand(side, resolution=min(resolution, 1500), **options)
+
+    for place in ("warpjld.hand.kept.kept_hand", "warpjld.hand.build_hand", "warpjld.build_hand"):
+        monkeypatch.setattr(place, coarse)
+
+
+def run_small(name: str, out: Path, frames: tuple[int, int] | None = None, text: str = "") -> dict:
+    """Run a script of the examples in small pictures, and these frames only; with another text, if one is given."""
     scene = Scene(folder=out, say=lambda text: None)
-    Interpreter(scene).run_file(EXAMPLES / name)
+    if text:
+        Interpreter(scene).run_text(text)
+    else:
+        Interpreter(scene).run_file(EXAMPLES / name)
     scene.size = (120, 90)
     if frames is not None:
         scene.first, scene.last = frames
@@ -112,7 +133,9 @@ def overlap(folder: Path) -> float:
 
 
 def test_loads_bend_bars(tmp_path) -> None:
-    summary = run_small("loads.jld", tmp_path)
+    text = (EXAMPLES / "loads.jld").read_text(encoding="utf-8")
+    assert "ELEMENT 0.006" in text
+    summary = run_small("loads.jld", tmp_path, text=text.replace("ELEMENT 0.006", "ELEMENT 0.012"))
     assert summary["press"]["status"] == "CONVERGED"
     assert summary["notes"] == []
     assert (tmp_path / "loads.png").stat().st_size > 1000
@@ -220,7 +243,8 @@ def test_python_api(tmp_path, capsys) -> None:
     assert "31 frames" in capsys.readouterr().out
 
 
-def test_python_contact(capsys) -> None:
+def test_python_contact(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpjld.FleshMaterial", partial(FleshMaterial, element=0.004))
     names = runpy.run_path(str(EXAMPLES / "python_contact.py"))
     found = names["found"]
     assert found.solved.status.name == "CONVERGED"

@@ -117,10 +117,14 @@ def test_examples(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     tests = examples_of(name)
     assert tests, f"{name} has no example"
     silence_warp()  # its greeting is no part of what examples print
-    for slow in ("build_hand", "build_body", "bind"):
+    for slow, less in (("build_hand", {"resolution": 1500}), ("build_body", {"resolution": 250}), ("bind", {})):
         original = getattr(wj, slow)
         monkeypatch.setattr(
-            wj, slow, lambda *given, _original=original, **how: _built(_original, *given, tuple(how.items()))
+            wj,
+            slow,
+            lambda *given, _original=original, _less=less, **how: _built(
+                _original, *given, tuple((_less | how).items())
+            ),
         )
     told: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -13,10 +14,14 @@ LONGEST_FUNCTION = 60
 """Lines of code, docstring and signature aside."""
 
 
-def modules() -> Iterator[tuple[Path, ast.Module]]:
+def files() -> Iterator[Path]:
     for room in ("warpjld", "kernels"):
-        for path in sorted((ROOT / room).rglob("*.py")):
-            yield path, ast.parse(path.read_text(encoding="utf-8"))
+        yield from sorted((ROOT / room).rglob("*.py"))
+
+
+@cache
+def modules() -> list[tuple[Path, ast.Module]]:
+    return [(path, ast.parse(path.read_text(encoding="utf-8"))) for path in files()]
 
 
 def defined(tree: ast.Module) -> set[str]:
@@ -50,7 +55,7 @@ def test_no_two_public_names_are_alike() -> None:
 
 
 def test_no_file_is_long() -> None:
-    lengths = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8").count("\n") for path, _ in modules()}
+    lengths = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8").count("\n") for path in files()}
     assert {path: lines for path, lines in lengths.items() if lines > LONGEST_FILE} == {}
 
 

@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from warpjld.errors import InputError
+from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.directing import camera_at, shot_at
 from warpjld.script.runner import run_scene
@@ -88,13 +89,12 @@ def test_a_film_cuts_from_shot_to_shot(tmp_path: Path) -> None:
     assert min(bright[:3]) > 5.0 * max(bright[3:])
 
 
-def test_an_actor_has_its_colour(tmp_path: Path) -> None:
-    from warpjld.hand import build_hand
+def test_an_actor_has_its_colour(hands: dict[str, Rig]) -> None:
     from warpjld.script.runner import cast
 
     scene = stage("")
-    scene.add("left", build_hand("left", resolution=1500))
-    scene.add("right", build_hand("right", resolution=1500))
+    scene.add("left", hands["left"])
+    scene.add("right", hands["right"])
     frames = np.zeros(1)
     assert cast(scene, frames).colors is None
     Interpreter(scene).run_text("COLOR RIGHT 'lime'\n")

@@ -84,7 +84,7 @@ def test_it_is_kept_where_every_output_fails_and_the_folder_would_not_be_made(
         raise RuntimeError("a fault")
 
     monkeypatch.setattr("warpjld.script.making.write_motions", broken)
-    scene = scene_of(tmp_path, "PRESS 0 4")
+    scene = scene_of(tmp_path, "PRESS 0 1")
     with pytest.raises(RuntimeError, match="a fault"):
         run_scene(scene, tmp_path / "out")
     assert [file.name for file in (tmp_path / "out").iterdir()] == [KEPT]
@@ -121,7 +121,7 @@ def test_frames_solved_before_ctrl_c_are_made_named_and_gone_on_from(
 def test_ctrl_c_before_anything_is_solved_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     interrupting(monkeypatch, 1.0)
     with pytest.raises(KeyboardInterrupt):
-        run_scene(scene_of(tmp_path, "PRESS 0 4"), tmp_path / "out")
+        run_scene(scene_of(tmp_path, "PRESS 0 1"), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

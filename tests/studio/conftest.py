@@ -46,16 +46,6 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-@pytest.fixture(autouse=True, scope="session")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """The hand is built, and bound, once for all of these tests."""
-    folder = tmp_path_factory.getbasetemp() / "kept"
-    folder.mkdir(exist_ok=True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("WARPJLD_CACHE", str(folder))
-        yield
-
-
 WAVE = "HAND LEFT BUILTIN RESOLUTION 1500\nJOINT left.index.base FLEXION AT 0 0\n"
 """A small hand, and a key."""
 
@@ -69,7 +59,7 @@ def script(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def room(script: Path, kept: None) -> Iterator[Room]:
+def room(script: Path) -> Iterator[Room]:
     """A studio with that script."""
     pytest.importorskip("viser", reason="viser is not installed")
     made = Room(opened_document(script, script.parent / "out"), port=0)
