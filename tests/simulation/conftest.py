@@ -14,9 +14,9 @@ from warpjld.script import Interpreter, Scene
 @pytest.fixture(scope="session")
 def rig() -> Rig:
     """A left hand."""
-    from warpjld.hand import build_hand
+    from warpjld.hand.kept import kept_hand
 
-    return build_hand("left")
+    return kept_hand("left", resolution=4000)
 
 
 @pytest.fixture
@@ -34,8 +34,6 @@ def run(rig: Rig) -> Callable[[str], Scene]:
 
 
 @pytest.fixture(scope="session")
-def hand() -> FleshHand:
-    """Its flesh, coarsely skinned."""
-    from warpjld.hand import build_hand
-
-    return build_flesh_hand(build_hand("left", resolution=4000), 0.003)
+def hand(rig: Rig) -> FleshHand:
+    """Its flesh, coarse."""
+    return build_flesh_hand(rig, 0.004)

@@ -23,7 +23,7 @@ PLATE = """
 OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
 SPLINE 1
 GRASP 0 4 LEFT plate INDEX
-FLESH LEFT INDEX ELEMENT 0.003
+FLESH LEFT INDEX ELEMENT 0.004
 FRICTION 0.5
 FRAMES 0 8
 """
@@ -167,7 +167,7 @@ def test_corrections_are_kept_in_a_state_and_gone_on_from(rig: Rig, tmp_path: Pa
 def test_a_load_that_opening_cannot_lessen_is_named(run: Callable[[str], Scene], tmp_path: Path) -> None:
     """The hand as a whole is moved down on the plate: no joint has closed."""
     scene = run(
-        "OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\nFLESH LEFT INDEX ELEMENT 0.003\n"
+        "OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\nFLESH LEFT INDEX ELEMENT 0.004\n"
         "MOVE LEFT 0 0 0.002 0\nMOVE LEFT 10 0 -0.008 0\nSTRENGTH LEFT INDEX 0.1\nFRAMES 0 8\nPRESS 0 8 EVERY 2 CORRECT"
     )
     report = solved(scene, tmp_path)
