@@ -13,17 +13,26 @@ from warpjld.script import Interpreter, Scene
 
 @pytest.fixture(scope="session")
 def rig() -> Rig:
-    """A left hand."""
+    """A left hand, coarse."""
     from warpjld.hand.kept import kept_hand
 
     return kept_hand("left", resolution=4000)
 
 
+@pytest.fixture(scope="session")
+def fine() -> Rig:
+    """A left hand with as many vertices as usual."""
+    from warpjld.hand.kept import kept_hand
+
+    return kept_hand("left")
+
+
 @pytest.fixture
-def run(rig: Rig) -> Callable[[str], Scene]:
-    """Runs lines on a stage with that hand."""
+def run(request: pytest.FixtureRequest) -> Callable[[str], Scene]:
+    """Runs lines on a stage with a left hand: coarse where the test is quick."""
     scene = Scene(say=lambda text: None)
-    scene.add("left", rig)
+    slow = request.node.get_closest_marker("slow") is not None
+    scene.add("left", request.getfixturevalue("fine" if slow else "rig"))
     interpreter = Interpreter(scene)
 
     def run_text(text: str) -> Scene:

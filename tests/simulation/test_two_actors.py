@@ -100,9 +100,10 @@ def test_segments_that_are_none(figure: Rig) -> None:
 @pytest.mark.slow
 def test_an_arm_of_flesh_bends(figure: Rig, tmp_path: Path) -> None:
     """By bending alone: flesh is strained, bones go where the covering's go, and far from the elbow its skin, too."""
-    scene = arm(figure, 
+    scene = arm(
+        figure,
         "ELBOW LEFT FLEXION AT 0 0\nELBOW LEFT FLEXION AT 3 45\n"
-        "FLESH BODY left.upper_arm left.forearm ELEMENT 0.02 FLEXION ITSELF OFF\nFRAMES 0 3\nPRESS 0 3\n"
+        "FLESH BODY left.upper_arm left.forearm ELEMENT 0.02 FLEXION ITSELF OFF\nFRAMES 0 3\nPRESS 0 3\n",
     )
     found = run_contact(scene, tmp_path)
     assert found.verdict.status == "CONVERGED"

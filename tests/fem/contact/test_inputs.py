@@ -114,8 +114,8 @@ def test_going_on_from_something_else(body: Body) -> None:
 def test_a_body_squeezed_to_nothing_says_so(travel: float, message: str) -> None:
     """Two plates that close almost, or entirely: the last equilibrium, and why there is no other."""
     mesh = ball_hexes(1.0, n=2, octant=True)
+    body = Body(mesh, NeoHooke(1.0, 0.3))
     with pytest.raises(ContactError, match=message) as caught:
-        body = Body(mesh, NeoHooke(1.0, 0.3))
         press(body, symmetric(mesh), [Pair("outer", lid(travel))], times=(0.2, 1.0), halvings=3)
     solution = caught.value.solution
     assert solution.status is not SolveStatus.CONVERGED

@@ -11,4 +11,4 @@ from warpjld.fem.hand import FleshHand, build_flesh_hand
 def hand() -> FleshHand:
     from warpjld.hand.kept import kept_hand
 
-    return build_flesh_hand(kept_hand("left", resolution=2500), 0.003)
+    return build_flesh_hand(kept_hand("left", resolution=4000), 0.003)

@@ -19,7 +19,7 @@ from warpjld.hand.kept import kept_hand
 
 @pytest.fixture(scope="module")
 def tip() -> Fingertip:
-    return build_fingertip(kept_hand("left", resolution=2500), "index", 0.0018)
+    return build_fingertip(kept_hand("left", resolution=4000), "index", 0.0018)
 
 
 def test_bone_nail_and_pulp(tip: Fingertip) -> None:
