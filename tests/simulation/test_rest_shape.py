@@ -111,7 +111,7 @@ def test_a_whole_hand_is_its_own_part(hand: FleshHand, rig: Rig) -> None:
 def test_bones_that_crush_flesh_between_them_let_it_go(data: Path) -> None:
     """A pinky bent so far that an element has no room between its phalanges: two or three nodes there are flesh's."""
     rig = load_rig(data / "hand_webxr_generic" / "left.glb")
-    built = build_flesh_hand(rig, 0.004)
+    built = build_flesh_hand(rig, 0.003)
     angles = np.zeros((1, len(rig.skeleton), 4))
     for joint, degrees in (("base", 86), ("knuckle2", 92), ("knuckle3", 75)):
         angles[0, rig.skeleton.index(f"left.pinky.{joint}"), 0] = np.radians(degrees)
