@@ -61,10 +61,9 @@ def test_spacing_too_coarse_for_the_fingers() -> None:
 
 @pytest.mark.parametrize("spacing", [0.004, 0.005])
 def test_coarse_elements_fill_every_finger(spacing: float) -> None:
-    from warpjld.hand import build_hand
+    from warpjld.hand.kept import kept_hand
 
-    rig = build_hand("left")
-    flesh = flesh_of(rig, spacing)
+    flesh = flesh_of(kept_hand("left", resolution=4000), spacing)
     assert flesh.fit.least >= 0.1
     assert flesh.fit.volume > 0.94
     assert flesh.fit.gap < 0.6 * spacing

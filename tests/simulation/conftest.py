@@ -13,17 +13,26 @@ from warpjld.script import Interpreter, Scene
 
 @pytest.fixture(scope="session")
 def rig() -> Rig:
-    """A left hand."""
-    from warpjld.hand import build_hand
+    """A left hand, coarse."""
+    from warpjld.hand.kept import kept_hand
 
-    return build_hand("left")
+    return kept_hand("left", resolution=4000)
+
+
+@pytest.fixture(scope="session")
+def fine() -> Rig:
+    """A left hand with as many vertices as usual."""
+    from warpjld.hand.kept import kept_hand
+
+    return kept_hand("left")
 
 
 @pytest.fixture
-def run(rig: Rig) -> Callable[[str], Scene]:
-    """Runs lines on a stage with that hand."""
+def run(request: pytest.FixtureRequest) -> Callable[[str], Scene]:
+    """Runs lines on a stage with a left hand: coarse where the test is quick."""
     scene = Scene(say=lambda text: None)
-    scene.add("left", rig)
+    slow = request.node.get_closest_marker("slow") is not None
+    scene.add("left", request.getfixturevalue("fine" if slow else "rig"))
     interpreter = Interpreter(scene)
 
     def run_text(text: str) -> Scene:
@@ -34,8 +43,6 @@ def run(rig: Rig) -> Callable[[str], Scene]:
 
 
 @pytest.fixture(scope="session")
-def hand() -> FleshHand:
-    """Its flesh, coarsely skinned."""
-    from warpjld.hand import build_hand
-
-    return build_flesh_hand(build_hand("left", resolution=4000), 0.003)
+def hand(rig: Rig) -> FleshHand:
+    """Its flesh, coarse."""
+    return build_flesh_hand(rig, 0.004)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import SceneAnimation, run_contact
 from warpjld.simulation.bodies.skin_obstacle import SkinObstacle, bystanders
@@ -15,7 +15,7 @@ from warpjld.simulation.bodies.skin_obstacle import SkinObstacle, bystanders
 
 def two_hands(lines: str) -> Scene:
     """A left hand whose index comes down on the back of a right one."""
-    left, right = build_hand("left", resolution=2500), build_hand("right", resolution=2500)
+    left, right = kept_hand("left", resolution=2500), kept_hand("right", resolution=2500)
     skin, tip = left.surface.vertices, left.skeleton.rest[left.skeleton.index("left.index.tip")]
     near = skin[np.linalg.norm(skin - tip, axis=1) < 0.02]
     pad = near[near[:, 1].argmin()]

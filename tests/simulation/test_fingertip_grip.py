@@ -19,8 +19,8 @@ WEIGHT, EDGE = 0.5, 0.02
 
 
 @pytest.fixture(scope="module")
-def tip(rig: Rig) -> Fingertip:
-    return build_fingertip(rig, "index", 0.003)
+def tip(fine: Rig) -> Fingertip:
+    return build_fingertip(fine, "index", 0.003)
 
 
 def beside(tip: Fingertip, side: str, sign: float) -> HexMesh:

@@ -35,12 +35,12 @@ def _tight() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def pressed(rig: Rig) -> Simulation:
+def pressed(fine: Rig) -> Simulation:
     """Down by 6.3 mm, then half a hundredth of a millimetre more and a millimetre aside: most points slide."""
     root = np.zeros((4, 3))
     root[:, 1] = [0.0, -0.005, -0.0063, -0.00635]
     root[3, 0] = 1e-3
-    hand = RecordedActor("hand", rig, angles=np.zeros((4, len(rig.skeleton), 4)), root=root)
+    hand = RecordedActor("hand", fine, angles=np.zeros((4, len(fine.skeleton), 4)), root=root)
     plate = RecordedObject("plate", trimesh.creation.box((0.036, 0.006, 0.036)), positions=(0.034, -0.0275, -0.165))
     contact = ContactSpecification(
         flesh={"hand": FleshMaterial(digits=("index",), element=0.004)},

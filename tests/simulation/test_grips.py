@@ -28,6 +28,8 @@ FRICTION 0.5
 FRAMES 0 8
 """
 
+FORCE = PLATE.replace("0.003", "0.004") + "SQUEEZE 5 8 LEFT FORCE 0.6\n"
+
 BALL = """
 OBJECT BALL BALL 0.024 AT 0.0411 -0.0568 -0.088
 FINGER1  LEFT INDEX FLEXION    AT 0 70
@@ -49,7 +51,7 @@ def pressed(rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, 
     scene = Scene(say=lambda text: None)
     scene.add("left", rig)
     Interpreter(scene).run_text(
-        PLATE + "SQUEEZE 5 8 LEFT FORCE 0.6\nPRESS 2 8\nSIZE 160 120\nPICTURE 8 'a.png'\n"
+        FORCE + "PRESS 2 8\nSIZE 160 120\nPICTURE 8 'a.png'\n"
         "TACTILE 'touch.csv'\nTACTILE 'touch.png' LEFT\nTACTILE 'touch.parquet'"
     )
     out = tmp_path_factory.mktemp("force")
@@ -133,10 +135,10 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 
 
 @pytest.mark.slow
-def test_corrections_are_kept_in_a_state_and_gone_on_from(rig: Rig, tmp_path: Path) -> None:
+def test_corrections_are_kept_in_a_state_and_gone_on_from(fine: Rig, tmp_path: Path) -> None:
     def run(text: str) -> Scene:
         scene = Scene(say=lambda text: None, warn=lambda text: None)
-        scene.add("left", rig)
+        scene.add("left", fine)
         Interpreter(scene).run_text(text)
         return scene
 
@@ -241,7 +243,7 @@ def test_a_state_keeps_the_grip_that_was_found(
     def again(name: str) -> None:
         scene = Scene(say=lambda text: None)
         scene.add("left", rig)
-        Interpreter(scene).run_text(PLATE + "SQUEEZE 5 8 LEFT FORCE 0.6\nPRESS 2 8 STATE 's.npz'\nEXPORT 'e.npz'")
+        Interpreter(scene).run_text(FORCE + "PRESS 2 8 STATE 's.npz'\nEXPORT 'e.npz'")
         run_scene(scene, tmp_path / name)
 
     def stopped(*_: object) -> None:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from warpjld.files.kept_files import CACHE_VARIABLE
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.simulation.bodies import kept_flesh
 from warpjld.skeleton.kinematics import rest_poses
 
 
 def test_a_mesh_out_of_a_file_is_the_one_that_was_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    rig = build_hand("left", resolution=1500)
+    rig = kept_hand("left", resolution=1500)
     poses, skin = rest_poses(rig.skeleton), np.asarray(rig.surface.vertices, np.float64)
     monkeypatch.setenv(CACHE_VARIABLE, "off")
     plain = kept_flesh.resting_flesh(rig, 0.006, "left", poses, skin)

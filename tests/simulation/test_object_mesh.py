@@ -35,7 +35,7 @@ def deformed(found: ObjectMesh, displacement: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("thing", [ball(0.06), box(), cylinder(), capsule()], ids=lambda thing: thing.name)
 def test_solid_objects_fill_their_surface(thing: GraspObject) -> None:
-    found = made(thing, element=0.004)
+    found = made(thing, element=0.005)
     assert volumes(found.mesh).sum() == pytest.approx(thing.volume, rel=0.03)
     np.testing.assert_allclose(
         deformed(found, np.zeros_like(found.mesh.nodes)), PLACE.apply(thing.vertices)[0], atol=1e-12

@@ -19,7 +19,7 @@ from warpjld.skeleton.kinematics import rest_poses
 
 @pytest.fixture(scope="module")
 def hand(rig: Rig) -> FleshHand:
-    return build_flesh_hand(rig, 0.003)
+    return build_flesh_hand(rig, 0.004)
 
 
 @pytest.fixture(scope="module")

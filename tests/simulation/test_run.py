@@ -13,6 +13,7 @@ import pytest
 from warpjld.errors import InputError
 from warpjld.fem import SolveStatus
 from warpjld.grasp import Places
+from warpjld.rig import Rig
 from warpjld.script import Scene
 from warpjld.script.contact import SceneAnimation, run_contact
 from warpjld.script.runner import run_scene
@@ -30,12 +31,12 @@ FRAMES 0 8
 
 
 @pytest.fixture(scope="module")
-def pressed(rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+def pressed(fine: Rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """The script made once: its folder and its summary."""
     from warpjld.script import Interpreter
 
     scene = Scene(say=lambda text: None)
-    scene.add("left", rig)
+    scene.add("left", fine)
     Interpreter(scene).run_text(
         PLATE + "PRESS 0 8 EVERY 2 STATE 'state.npz'\nSIZE 160 120\nPICTURE 8 'a.png' PRESSURE LEFT\n"
         "PICTURE 8 'b.png' PRESSURE\nPICTURE 8 'd.png' PRESSURE LEFT INDEX\n"
@@ -88,7 +89,7 @@ def test_the_skin_stays_out_of_the_plate(pressed: tuple[Path, dict]) -> None:
 
 
 @pytest.mark.slow
-def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_path: Path) -> None:
+def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], fine: Rig, tmp_path: Path) -> None:
     import shutil
 
     from warpjld.script import Interpreter
@@ -96,7 +97,7 @@ def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_p
     out, _ = pressed
     shutil.copy(out / "state.npz", tmp_path / "state.npz")
     scene = Scene(say=lambda text: None)
-    scene.add("left", rig)
+    scene.add("left", fine)
     Interpreter(scene).run_text(PLATE + "PRESS 0 8 EVERY 2 STATE 'state.npz'")
     again = run_contact(scene, tmp_path)
     assert again.solved.resumed == len(again.solved.frames)
@@ -104,7 +105,7 @@ def test_a_finished_state_is_gone_on_from(pressed: tuple[Path, dict], rig, tmp_p
         force = [float(row["force_n"]) for row in csv.DictReader(file) if row["digit"] == "index"]
     np.testing.assert_allclose([r.force_n for r in again.rows if r.digit == "index"], force, rtol=1e-5)
     scene = Scene(say=lambda text: None)
-    scene.add("left", rig)
+    scene.add("left", fine)
     Interpreter(scene).run_text(PLATE + "PRESS 0 7 EVERY 2 STATE 'state.npz'")
     with pytest.raises(InputError, match=r"state.npz: this state belongs to another scene: frames"):
         run_contact(scene, tmp_path)

@@ -105,10 +105,10 @@ def test_a_grip_of_recorded_poses_is_refused(rig: Rig) -> None:
 
 
 @pytest.mark.slow
-def test_poses_of_a_script_press_as_the_script_does(rig: Rig, tmp_path: Path) -> None:
+def test_poses_of_a_script_press_as_the_script_does(fine: Rig, tmp_path: Path) -> None:
     """A fingertip on a plate, once from a script and once from arrays of its poses."""
     scene = Scene(say=lambda text: None)
-    scene.add("left", rig)
+    scene.add("left", fine)
     Interpreter(scene).run_text(
         "OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\nMOVE LEFT 0 0 0.002 0\nMOVE LEFT 6 0 -0.006 0\n"
         "FLESH LEFT INDEX ELEMENT 0.004\nPRESS 0 6 EVERY 2"
@@ -116,7 +116,7 @@ def test_poses_of_a_script_press_as_the_script_does(rig: Rig, tmp_path: Path) ->
     actor = SceneAnimation(scene).actors["LEFT"]
     poses = [actor.pose(float(frame)) for frame in range(7)]
     arrays = Poses(*(np.concatenate([getattr(one, f.name) for one in poses]) for f in fields(Poses)))
-    hand = RecordedActor("LEFT", rig, poses=arrays, covering=actor.covering)
+    hand = RecordedActor("LEFT", fine, poses=arrays, covering=actor.covering)
     plate = RecordedObject("PLATE", scene.prop("plate").thing, positions=(0.034, -0.0275, -0.165))
     found = simulate(scene.contact, RecordedAnimation([hand], [plate]))
     asked = run_contact(scene, tmp_path)

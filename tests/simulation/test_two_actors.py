@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.hand import build_hand
-from warpjld.hand.figure import build_body
+from warpjld.hand.kept import kept_hand
+from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import SceneAnimation, run_contact
 from warpjld.simulation.bodies.segment_surface import segment_surface
@@ -32,14 +32,14 @@ PRESS 0 4 EVERY 2
 def hands(text: str = PADS) -> Scene:
     scene = Scene(say=lambda line: None)
     for side in ("left", "right"):
-        scene.add(side, build_hand(side, resolution=2500))  # type: ignore[arg-type]
+        scene.add(side, kept_hand(side, resolution=2500))
     Interpreter(scene).run_text(text)
     return scene
 
 
-def arm(text: str) -> Scene:
+def arm(figure: Rig, text: str) -> Scene:
     scene = Scene(say=lambda line: None)
-    scene.add("body", build_body())
+    scene.add("body", figure)
     Interpreter(scene).run_text(text)
     return scene
 
@@ -69,9 +69,9 @@ def test_index_pads_of_two_hands_press_each_other(tmp_path: Path) -> None:
     assert row.against == "LEFT"
 
 
-def test_the_skin_of_segments() -> None:
+def test_the_skin_of_segments(figure: Rig) -> None:
     """Of a body's upper arm and forearm, a little more than theirs, and none of the trunk's that is near."""
-    scene = arm("")
+    scene = arm(figure, "")
     staged = SceneAnimation(scene).actors["BODY"]
     part = segment_surface(staged.rig, staged.covering, ["left.upper_arm", "left.forearm"], 0.02)
     places = part.rig.surface.vertices
@@ -87,22 +87,23 @@ def test_the_skin_of_segments() -> None:
     assert part.share[part.vertices[rim]].max() < 0.2
 
 
-def test_segments_that_are_none() -> None:
+def test_segments_that_are_none(figure: Rig) -> None:
     with pytest.raises(InputError, match=r"1:12: there is no segment 'left\.foream'.*did you mean left\.forearm"):
-        arm("FLESH BODY left.foream")
+        arm(figure, "FLESH BODY left.foream")
     with pytest.raises(InputError, match=r"no segment 'left\.shin'"):
         hands("FLESH LEFT left.shin")
-    scene = arm("FLESH BODY left.upper_arm forearm ELEMENT 0.02 FLEXION")
+    scene = arm(figure, "FLESH BODY left.upper_arm forearm ELEMENT 0.02 FLEXION")
     assert scene.contact.flesh["BODY"].segments == ("left.upper_arm", "forearm")
     assert scene.contact.flesh["BODY"].flexion
 
 
 @pytest.mark.slow
-def test_an_arm_of_flesh_bends(tmp_path: Path) -> None:
+def test_an_arm_of_flesh_bends(figure: Rig, tmp_path: Path) -> None:
     """By bending alone: flesh is strained, bones go where the covering's go, and far from the elbow its skin, too."""
     scene = arm(
+        figure,
         "ELBOW LEFT FLEXION AT 0 0\nELBOW LEFT FLEXION AT 3 45\n"
-        "FLESH BODY left.upper_arm left.forearm ELEMENT 0.02 FLEXION ITSELF OFF\nFRAMES 0 3\nPRESS 0 3\n"
+        "FLESH BODY left.upper_arm left.forearm ELEMENT 0.02 FLEXION ITSELF OFF\nFRAMES 0 3\nPRESS 0 3\n",
     )
     found = run_contact(scene, tmp_path)
     assert found.verdict.status == "CONVERGED"

@@ -91,7 +91,7 @@ def test_solids_against_the_facets_they_are_drawn_with(name: str) -> None:
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     assert mesh.is_watertight
     assert mesh.volume > 0.0
-    points = cloud(solid, time, 60)
+    points = cloud(solid, time, 24)
     edges = vertices[mesh.edges_unique].mean(axis=1)
     sag = 1.1 * np.abs(solid.project(np.concatenate([mesh.triangles_center, edges]), time).distance).max()
     np.testing.assert_allclose(solid.project(points, time).distance, brute_force(points, vertices, faces), atol=sag)
@@ -123,7 +123,7 @@ def test_meshes_against_brute_force(name: str) -> None:
     obstacle, time = MESHES[name], 0.37
     vertices, faces = obstacle.mesh(time)
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    points = cloud(obstacle, time, 150)
+    points = cloud(obstacle, time, 60)
     found = obstacle.project(points, time)
     np.testing.assert_allclose(found.distance, brute_force(points, vertices, faces), atol=TOLERANCE * size)
     np.testing.assert_allclose(np.linalg.norm(points - found.closest, axis=1), np.abs(found.distance), atol=1e-12)

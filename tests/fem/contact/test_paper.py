@@ -86,7 +86,7 @@ def _fingertip(plate_over_flesh: float) -> tuple[Body, Prescribed]:
     return body, held + prescribe(whole, "plate.z-", x=0.0, y=0.0, z=0.0)
 
 
-@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
 def test_a_finger_on_a_plate_settles(ratio):
     """Forces are those of the coupled method as far as nodes on facets are like mortar averages, at 3 mm an edge."""
     body, held = _fingertip(ratio)

@@ -12,7 +12,7 @@ from warpjld.fem.contact.obstacles.solids import Plane
 
 def squeezed() -> tuple[Body, Prescribed, Plane]:
     """An octant of a ball under a plate that comes down, and goes up again from time 1 to 2."""
-    mesh = ball_hexes(1.0, n=6, octant=True)
+    mesh = ball_hexes(1.0, n=4, octant=True)
     plate = Plane((0, 0, 1), (0, 0, -1), motion=lambda t: ((0.0, 0.0, -0.1 * min(t, 2.0 - t)), (0, 0, 0, 1)))
     return Body(mesh, NeoHooke(1.0, 0.45)), symmetric(mesh), plate
 

@@ -12,7 +12,7 @@ from warpjld.fem.contact import ContactSolution, Pair, press
 def _pressed(threads: int) -> ContactSolution:
     """A block pressed on another and dragged, its mesh turned against the other's."""
     law = NeoHooke(1e5, 0.45)
-    lower, upper = box_hexes((1.0, 1.0, 0.4), (8, 8, 4)), box_hexes((0.7, 0.7, 0.4), (7, 6, 4))
+    lower, upper = box_hexes((1.0, 1.0, 0.4), (6, 6, 3)), box_hexes((0.7, 0.7, 0.4), (5, 4, 3))
     turn = np.array([[np.cos(0.3), -np.sin(0.3), 0.0], [np.sin(0.3), np.cos(0.3), 0.0], [0.0, 0.0, 1.0]])
     upper = type(upper)(upper.nodes @ turn.T, upper.elements, upper.regions, faces=upper.faces)
     mesh = merge(named(lower, "a"), named(upper, "b", (0.25, 0.1, 0.401)))

@@ -9,6 +9,6 @@ from warpjld.fem.hand import FleshHand, build_flesh_hand
 
 @pytest.fixture(scope="session")
 def hand() -> FleshHand:
-    from warpjld.hand import build_hand
+    from warpjld.hand.kept import kept_hand
 
-    return build_flesh_hand(build_hand("left", resolution=4000), 0.003)
+    return build_flesh_hand(kept_hand("left", resolution=4000), 0.003)

@@ -14,12 +14,12 @@ from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
 from warpjld.fem.hand import hand_laws
 from warpjld.fem.hand.fingertip import Fingertip, build_fingertip
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 
 
 @pytest.fixture(scope="module")
 def tip() -> Fingertip:
-    return build_fingertip(build_hand("left", resolution=4000), "index", 0.0018)
+    return build_fingertip(kept_hand("left", resolution=4000), "index", 0.0018)
 
 
 def test_bone_nail_and_pulp(tip: Fingertip) -> None:
@@ -35,7 +35,7 @@ def test_bone_nail_and_pulp(tip: Fingertip) -> None:
     assert tip.facing(0.0) == pytest.approx(-tip.back)
     assert tip.facing(np.pi / 2) == pytest.approx(tip.along)
     with pytest.raises(InputError, match="no joint 'finger"):
-        build_fingertip(build_hand("left", resolution=2000), "finger")
+        build_fingertip(kept_hand("left", resolution=2500), "finger")
 
 
 def test_pressed_fingertip_stiffens(tip: Fingertip) -> None:

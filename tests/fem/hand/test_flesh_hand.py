@@ -126,7 +126,7 @@ def test_what_cannot_be_is_refused(hand: FleshHand) -> None:
         hand_laws(hand.mesh.region_names, poisson=0.5)
     with pytest.raises(InputError, match="poses: want 26 joints, got 1"):
         hand.prescribed(Poses(np.zeros((1, 1, 3)), np.zeros((1, 1, 4)), np.zeros((1, 1))))
-    from warpjld.hand import build_hand
+    from warpjld.hand.kept import kept_hand
 
     with pytest.raises(InputError, match="gap, head"):
-        build_flesh_hand(build_hand("left", resolution=2000), gap=0.6)
+        build_flesh_hand(kept_hand("left", resolution=2500), gap=0.6)

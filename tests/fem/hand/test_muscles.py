@@ -15,14 +15,14 @@ from warpjld.fem.hand.limits import FORCE_LIMITS, force_limits
 from warpjld.fem.hand.muscles import effort_of
 from warpjld.fem.hand.suggestions import DigitSlopes, suggestions
 from warpjld.fem.load.loads import Loads
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.simulation.grip.correct import Correction, correct_angles
 from warpjld.skeleton import Skeleton, rest_poses
 
 
 @pytest.fixture(scope="module")
 def skeleton() -> Skeleton:
-    return build_hand("left", resolution=2000).skeleton
+    return kept_hand("left", resolution=2500).skeleton
 
 
 def curl(skeleton: Skeleton, degrees: float, *digits: str) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from warpjld.covering import bind
 from warpjld.fem import Body
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.hand import FleshHand, hand_laws
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.simulation.bodies.flesh_body import BoneMotion, flesh_body
 from warpjld.simulation.bodies.rest_shape import cut_to_digits, rest_in_pose
 from warpjld.simulation.bodies.skin_parts import skin_parts
@@ -53,7 +53,7 @@ class Hand:
         def poses(share: float) -> Poses:
             return poses_from_angles(skeleton, between(skeleton, start, end, share))
 
-        surface = build_hand("left", resolution=4000).surface
+        surface = kept_hand("left", resolution=4000).surface
         skin = bind(skeleton, surface).deform(poses(0.0))[0].astype(np.float64)
         hand, _ = rest_in_pose(whole, poses(0.0), skin)
         part = cut_to_digits(hand, poses(0.0), skin, digits)

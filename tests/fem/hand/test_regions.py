@@ -62,9 +62,9 @@ def test_elements_too_large_for_the_flesh_are_told(hand: FleshHand) -> None:
     assert len(found) == 14
     assert found["left.index.distal"].elements == 2
     assert 5e-3 < found["left.index.distal"].depth < 8e-3
-    from warpjld.hand import build_hand
+    from warpjld.hand.kept import kept_hand
 
-    coarse = build_flesh_hand(build_hand("left", resolution=4000), 0.005)
+    coarse = build_flesh_hand(kept_hand("left", resolution=4000), 0.005)
     note = coarse_note(cushions(coarse), 0.005)
     assert note is not None
     assert note.startswith("elements of 5 mm are too large for the flesh over the bones")
