@@ -69,8 +69,7 @@ def test_the_palm_lies_on_an_object(anny: Scene) -> None:
     assert 0.03 < nearest < 0.043
 
 
-def test_what_is_out_of_reach_is_said_with_the_distance(anny: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpjld.skeleton.reach._STARTS", 1)
+def test_what_is_out_of_reach_is_said_with_the_distance(anny: Scene) -> None:
     scene = _fresh(anny)
     told: list[str] = []
     scene.warn = told.append
