@@ -63,7 +63,10 @@ def _layers(path: Path) -> list[Path]:
         from pxr import Sdf, UsdUtils
     except ImportError:
         return []
+    from warpjld.io.usd.stage import check_usd_content
+
     try:
+        check_usd_content(path)  # its reader refuses it with the reason
         layers, _, _ = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
     except Exception:  # whatever its plug-ins raise
         return []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -16,9 +17,10 @@ from warpjld.errors import InputError, MissingExtraError
 from warpjld.files.archive import check_archive
 from warpjld.files.input_file import read_bytes
 from warpjld.files.nesting import nesting
+from warpjld.io.usd.crate import MAGIC, check_crate
 from warpjld.limits import check_limit
 
-__all__ = ["UsdFile", "open_usd", "usd_matrices"]
+__all__ = ["UsdFile", "check_usd_content", "open_usd", "usd_matrices"]
 
 _MOST_WARNINGS = 5  # largest number of OpenUSD's warnings that are passed on
 _PLACE = re.compile(r"^Error in '[^']*' at line \d+ in file \S+ : '(.*?)'?$")
@@ -49,13 +51,20 @@ class UsdFile:
         return list(Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()))
 
 
-def _check_content(path: Path) -> None:
+def check_usd_content(path: Path) -> None:
     """Reject content that OpenUSD would take very long to reject, or would unpack without limit."""
     raw = read_bytes(path)
     if raw.startswith(b"#usda"):
         check_limit("depth", nesting(raw, b"[{(", b"]})"), of="brackets", path=path)
     elif raw.startswith(b"PK"):
         check_archive(path, "USD package (.usdz)")
+        with zipfile.ZipFile(path) as package:
+            for name in package.namelist():
+                part = package.read(name)
+                if part.startswith(MAGIC):
+                    check_crate(part, path)
+    elif raw.startswith(MAGIC):
+        check_crate(raw, path)
 
 
 @contextmanager
@@ -69,7 +78,7 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
     path = Path(path)
     if not path.exists():
         raise InputError("no such file", path=path)
-    _check_content(path)
+    check_usd_content(path)
     try:
         from pxr import Tf, Usd, UsdGeom, UsdUtils
     except ImportError as error:
