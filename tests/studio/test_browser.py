@@ -185,6 +185,7 @@ def test_a_click_selects_the_joint_and_a_dragged_fingertip_bends_its_finger(wind
         low, high = state.channels()[name]
         assert low <= degrees <= high
     room.post(lambda: room.state.undo())
+    assert room.worker.settle()  # no actor is there while the scene is made anew
     until(lambda: np.linalg.norm(index_tip(state) - tip) < 1e-9, "it is undone in one step")
 
 
