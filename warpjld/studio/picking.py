@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpjld.geometry.segment_distance import segment_distance
 from warpjld.script.scene import Actor
 from warpjld.studio.surfaces import Shown
 
@@ -40,8 +41,7 @@ def joint_at(actor: Actor, vertex: int) -> str | None:
         return None
     skeleton, place = actor.skeleton, covering.surface.vertices[vertex]
     segments = covering.fans[int(covering.domains[vertex].argmax())].segments
-    ends = [(skeleton.rest[segment.proximal], skeleton.rest[segment.distal]) for segment in segments]
-    distances = [_distance(place, *pair) for pair in ends]
+    distances = [segment_distance(place[None], skeleton.rest, [(s.proximal, s.distal)])[0] for s in segments]
     joint = segments[int(np.argmin(distances))].proximal
     while joint >= 0:
         if (skeleton.limits[joint, :, 0] < skeleton.limits[joint, :, 1]).any():
@@ -75,10 +75,3 @@ def _hit(surface: Shown, origin: NDArray[np.float64], direction: NDArray[np.floa
     place = origin + t[face] * direction
     corner = int(np.linalg.norm(corners[face] - place, axis=1).argmin())
     return float(t[face]), int(surface.faces[face, corner])
-
-
-def _distance(place: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> float:
-    """Distance of a point from a line segment [m]; points have shape (3,)."""
-    along = end - start
-    share = np.clip((place - start) @ along / max(float(along @ along), 1e-30), 0.0, 1.0)
-    return float(np.linalg.norm(place - start - share * along))

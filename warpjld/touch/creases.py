@@ -12,9 +12,10 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from warpjld.geometry.rotations import rotate, unit
+from warpjld.geometry.segment_distance import segment_distance
 from warpjld.skeleton.kinematics import Poses
 from warpjld.touch.frame import FULL, NONE, SHARE
-from warpjld.touch.patches import Patches, segment_distance
+from warpjld.touch.patches import Patches
 from warpjld.touch.smoothing import edge_lengths, skin_smoothing
 
 if TYPE_CHECKING:

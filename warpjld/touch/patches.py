@@ -13,11 +13,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from warpjld.geometry.normals import vertex_normals
+from warpjld.geometry.segment_distance import segment_distance
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
 
-__all__ = ["Patches", "half_width", "neighbours", "patches_of", "segment_distance"]
+__all__ = ["Patches", "half_width", "neighbours", "patches_of"]
 
 _COARSEST = 2.2  # largest length of a part's edges relative to its thickness
 _THINNEST = 0.5  # smallest thickness relative to the part's median, where bones run along the skin
@@ -170,19 +171,6 @@ def half_width(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArr
     for k in range(3):
         np.minimum.at(least, faces[:, k], half[faces].min(axis=1))
     return least
-
-
-def segment_distance(
-    points: NDArray[np.float64], joints: NDArray[np.float64], segments: list[tuple[int, int]]
-) -> NDArray[np.float64]:
-    """Distance of points (V, 3) to the nearest of the segments [m], shape (V,)."""
-    best = np.full(len(points), np.inf)
-    for a, b in segments:
-        along = joints[b] - joints[a]
-        square = max(float(along @ along), 1e-18)
-        t = np.clip((points - joints[a]) @ along / square, 0.0, 1.0)
-        best = np.minimum(best, np.linalg.norm(points - joints[a] - t[:, None] * along, axis=1))
-    return best
 
 
 def neighbours(faces: NDArray[np.int32], count: int) -> csr_array:

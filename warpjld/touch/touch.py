@@ -20,11 +20,12 @@ from scipy.sparse import csr_array
 
 from warpjld.covering.intersections import crossing_faces
 from warpjld.errors import InputError
+from warpjld.geometry.segment_distance import segment_distance
 from warpjld.runtime.threads import in_threads, threads_for
 from warpjld.skeleton.kinematics import Poses
 from warpjld.touch.creases import Creases
 from warpjld.touch.frame import SHARE, Bench, Model, Overlaps
-from warpjld.touch.patches import Patches, patches_of, segment_distance
+from warpjld.touch.patches import Patches, patches_of
 from warpjld.touch.smoothing import edge_lengths, skin_smoothing
 
 if TYPE_CHECKING:

@@ -60,9 +60,9 @@ def check_usd_content(path: Path) -> None:
         check_archive(path, "USD package (.usdz)")
         with zipfile.ZipFile(path) as package:
             for name in package.namelist():
-                part = package.read(name)
-                if part.startswith(MAGIC):
-                    check_crate(part, path)
+                with package.open(name) as part:  # textures are not read whole
+                    if (head := part.read(len(MAGIC))) == MAGIC:
+                        check_crate(head + part.read(), path)
     elif raw.startswith(MAGIC):
         check_crate(raw, path)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.geometry.segment_distance import segment_distance
 from warpjld.motion.out.source_motion import SourceMotion
 from warpjld.rig import Rig, Skin
-from warpjld.skeleton import Skeleton
 
 __all__ = ["joint_weights"]
 
@@ -69,7 +69,7 @@ def _bound(rig: Rig) -> Skin:
     for group, weight in zip(groups, domains.T, strict=True):
         touched = np.flatnonzero(weight)
         near = np.column_stack(
-            [_distance(vertices[touched], rig.skeleton, s.proximal, s.distal) for s in group.segments]
+            [segment_distance(vertices[touched], rig.skeleton.rest, [(s.proximal, s.distal)]) for s in group.segments]
         )
         share = np.maximum(near, 1e-9) ** -4.0
         share /= share.sum(axis=1, keepdims=True)
@@ -77,10 +77,3 @@ def _bound(rig: Rig) -> Skin:
             dense[touched, segment.proximal] += weight[touched] * share[:, k]
     joints = np.tile(np.arange(len(rig.skeleton), dtype=np.int32), (len(vertices), 1))
     return Skin(joints, dense)
-
-
-def _distance(points: NDArray[np.float64], skeleton: Skeleton, proximal: int, distal: int) -> NDArray[np.float64]:
-    """Distances of points from a segment [m], shape (n,)."""
-    start, along = skeleton.rest[proximal], skeleton.rest[distal] - skeleton.rest[proximal]
-    t = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - start - t[:, None] * along, axis=1))
