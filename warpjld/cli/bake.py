@@ -149,5 +149,5 @@ def _table(rows: list[Accuracy], fitted: int) -> None:
             (row.weights_rms, row.weights_largest),
             (row.corrected_rms, row.corrected_largest),
         )
-        told = (f"{a:8.3f} /{b:6.2f}" if a is not None and b is not None else "-" for a, b in cells)
-        click.echo(f"{row.poses:14}" + "".join(f"{text:>16}" for text in told))
+        cells_shown = (f"{a:8.3f} /{b:6.2f}" if a is not None and b is not None else "-" for a, b in cells)
+        click.echo(f"{row.poses:14}" + "".join(f"{text:>16}" for text in cells_shown))

@@ -134,7 +134,7 @@ def _watch_terminal() -> None:
     terminal.register(sys.stdin, 0)  # POLLHUP is always reported
 
     def wait() -> None:
-        if any(told & select.POLLHUP for _, told in terminal.poll()):
+        if any(events & select.POLLHUP for _, events in terminal.poll()):
             os.kill(os.getpid(), signal.SIGHUP)
 
     threading.Thread(target=wait, daemon=True, name="terminal").start()

@@ -186,11 +186,11 @@ def _clip(joints: list[_Joint], values: SpilledRows, rate: float, notes: list[st
     added = _add_to_offsets(joints, values, offsets)
     if added:
         notes = [*notes, "positions of joints are taken as additions to their OFFSETs"]
-    told = tuple(notes)
+    remarks = tuple(notes)
 
     def some(frames: slice) -> Clip:
         positions, rotations = _worlds(joints, values[frames], offsets, added=added)
-        return Clip(names, parents, rest, positions, rotations, rate, told, warnings)
+        return Clip(names, parents, rest, positions, rotations, rate, remarks, warnings)
 
     return streamed_clip(len(values), some)
 

@@ -63,24 +63,24 @@ def read_fbx_animation(path: str | Path, *, rate: float | None = None, name: str
     if name is None and len(moving) > 1:
         others = ", ".join(f"'{n}'" for n in moving if n != scene.title)
         notes.append(f"animation '{scene.title}' is played; the file also has {others}")
-    rows, told_of = SpilledRows(16 * len(skeleton.tree)), dict[int, str]()
+    rows, warned = SpilledRows(16 * len(skeleton.tree)), dict[int, str]()
     before = skeleton.tree.frames
     for block in scene.worlds.blocks():
         worlds = block.reshape(-1, len(scene.names), 4, 4)[:, skeleton.nodes] @ skeleton.squared
-        _turn_flat_ones(worlds, skeleton.tree, len(rows), before, told_of)
+        _turn_flat_ones(worlds, skeleton.tree, len(rows), before, warned)
         before = worlds[-1]
         rows.extend(worlds.reshape(len(worlds), -1))
-    warnings = list(told_of.values())
+    warnings = list(warned.values())
     if any(stack.shapes for stack in scene.stacks if stack.name == scene.title):
         warnings.append("the animation of blend shapes is not followed")
-    told = (*notes, *skeleton.notes)
+    remarks = (*notes, *skeleton.notes)
     nothing = np.zeros((0, len(skeleton.tree), 4, 4))
-    head = JointAnimation(skeleton.tree, nothing, scene.rate, scene.title, notes=told, warnings=tuple(warnings))
+    head = JointAnimation(skeleton.tree, nothing, scene.rate, scene.title, notes=remarks, warnings=tuple(warnings))
     return spilled_animation(head, rows)
 
 
 def _turn_flat_ones(
-    worlds: NDArray[np.float64], tree: SourceTree, first: int, before: NDArray[np.float64], told: dict[int, str]
+    worlds: NDArray[np.float64], tree: SourceTree, first: int, before: NDArray[np.float64], warnings: dict[int, str]
 ) -> None:
     """Replace singular transforms by the joint's previous rotation with a tiny scale, in place.
 
@@ -89,7 +89,7 @@ def _turn_flat_ones(
         tree: The joints.
         first: Number of the block's first frame.
         before: Transforms of the frame before the block, shape (N, 4, 4).
-        told: Warnings by joint, to which new ones are added.
+        warnings: Warnings by joint, to which new ones are added.
     """
     linear = worlds[..., :3, :3]
     flat = np.abs(np.linalg.det(linear)) <= _FLAT * np.abs(linear).max(axis=(-1, -2)) ** 3
@@ -97,7 +97,7 @@ def _turn_flat_ones(
         last = before[joint] if frame == 0 else worlds[frame - 1, joint]
         u, _, v = np.linalg.svd(last[:3, :3])
         linear[frame, joint] = _TINY * u @ v
-        told.setdefault(
+        warnings.setdefault(
             int(joint),
             f"joint '{tree.names[joint]}' is scaled to nothing at frame {first + frame}: its last rotation is kept",
         )

@@ -198,15 +198,15 @@ class _Widened:
 
     def warnings(self) -> list[str]:
         """A warning, if any."""
-        rig, told = self._rig, []
+        rig, found = self._rig, []
         for j in np.flatnonzero(self._off > _WIDENED).tolist():
             parent = int(rig.skeleton.parents[j])
             inherited = parent >= 0 and self._off[parent] > 0.0 and self._as_parent[j]
             if not inherited and self._largest[j] < _COLLAPSED:
-                told.append((rig.source_joints[j] or rig.skeleton.names[j], self._at[j], self._factor[j]))
-        if not told:
+                found.append((rig.source_joints[j] or rig.skeleton.names[j], self._at[j], self._factor[j]))
+        if not found:
             return []
-        shown = first_few([f"'{name}' to {round(factor, 6):.3g} at frame {frame}" for name, frame, factor in told])
+        shown = first_few([f"'{name}' to {round(factor, 6):.3g} at frame {frame}" for name, frame, factor in found])
         return [f"the animation scales {shown}: joints are placed as the file says, but the flesh keeps its size"]
 
 
@@ -244,14 +244,14 @@ class _Merged:
     def warnings(self) -> list[str]:
         """A warning, if any."""
         names, owners = self._source.names, self._rig.skeleton.names
-        told = [
+        found = [
             (apart, f"{names[s]} ({np.degrees(apart):.0f}°, part of {owners[self._over[s]]})")
             for s, apart in self._apart.items()
             if apart > _TURNED
         ]
-        if not told:
+        if not found:
             return []
-        shown = first_few([text for _, text in sorted(told, reverse=True)])
+        shown = first_few([text for _, text in sorted(found, reverse=True)])
         return [
             f"the animation rotates joints that are not part of this skeleton, and their flesh does not follow: {shown}"
         ]

@@ -64,12 +64,12 @@ def with_usable_rest(clip: Clip, *, side: str | None = None) -> tuple[Clip, Land
         notes = (f"the motion's rest says nothing of the body ({why}): its frame {frame} is taken as the rest",)
         marks = _sided_landmarks(clip, side)
         return clip, marks, (*marks.notes, *notes, *lies)
-    turn, told = turn_of_rest(clip, marks)
+    turn, turned = turn_of_rest(clip, marks)
     if turn is None:
-        return clip, marks, (*marks.notes, *told)
+        return clip, marks, (*marks.notes, *turned)
     clip = clip.turned_rest(turn)
     marks = _sided_landmarks(clip, side)
-    return clip, marks, (*marks.notes, *told)
+    return clip, marks, (*marks.notes, *turned)
 
 
 def _sided_landmarks(clip: Clip, side: str | None) -> Landmarks:
@@ -257,15 +257,15 @@ def turn_of_rest(clip: Clip, marks: Landmarks) -> tuple[NDArray[np.float64] | No
     own, found = _signed_axis(at_rest), _signed_axis(mean)
     if own @ found > 0.5:
         return None, ()
-    told = f"stands along {_axis_name(own)} in its rest and along {_axis_name(found)} in its frames"
+    direction = f"stands along {_axis_name(own)} in its rest and along {_axis_name(found)} in its frames"
     if not _stands(clip, found, own):
-        return None, (f"the recorded figure {told}: it is taken to lie, not to stand",)
+        return None, (f"the recorded figure {direction}: it is taken to lie, not to stand",)
     turn = minimal_rotation(own, found)
     if own @ found < -0.5:  # upside down: the rotation axis follows from the frames
         mean_turn = transform.Rotation.from_quat(clip.each(lambda some: some.rotations[:, pelvis])).mean()
         fitting = [g for g in transform.Rotation.create_group("O") if g.apply(own) @ found > 0.5]
         turn = np.asarray(min(fitting, key=lambda g: float((mean_turn * g.inv()).magnitude())).as_quat())
-    return turn, (f"the recorded figure {told}: the latter is taken as up",)
+    return turn, (f"the recorded figure {direction}: the latter is taken as up",)
 
 
 def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
@@ -279,8 +279,8 @@ def _up(clip: Clip, ways: NDArray[np.float64]) -> tuple[NDArray[np.float64], tup
     floors = [up for up in (y, z) if _stands(clip, up, found)]
     if found @ y > 0.5 or not floors or _stands(clip, found, floors[0]):
         return found, ()
-    told = f"the recorded figure is along {_axis_name(found)} in its frames, on a floor across {_axis_name(floors[0])}"
-    return floors[0], (f"{told}: it is taken not to stand, but to lie or the like",)
+    along = f"the recorded figure is along {_axis_name(found)} in its frames, on a floor across {_axis_name(floors[0])}"
+    return floors[0], (f"{along}: it is taken not to stand, but to lie or the like",)
 
 
 def _stands(clip: Clip, up: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

@@ -322,8 +322,8 @@ def _scale(source: Landmarks, target: Landmarks, pairs: dict[str, tuple[int, int
     scale = sum(b for _, b in known) / sum(a for a, _ in known) if known else 1.0
     if legs and known:
         return scale, ()
-    told = "from the other bones in common" if known else "as 1, since they have no bone in common"
-    return scale, (f"the recording and the rig have no legs in common: the scale of its travel is estimated {told}",)
+    basis = "from the other bones in common" if known else "as 1, since they have no bone in common"
+    return scale, (f"the recording and the rig have no legs in common: the scale of its travel is estimated {basis}",)
 
 
 def _some(names: tuple[str, ...]) -> str:

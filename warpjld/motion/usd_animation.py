@@ -68,8 +68,8 @@ def read_usd_animation(path: str | Path, *, rate: float | None = None, name: str
         if found is None:
             raise InputError(_no_skeleton(file), path=file.path)
         title, chosen, notes = _chosen(file, found.skeletons, name)
-        codes, rate, told = _time_codes(file, found.skeletons, chosen, rate)
-        warnings = [*told, *_shapes(chosen)]
+        codes, rate, remarks = _time_codes(file, found.skeletons, chosen, rate)
+        warnings = [*remarks, *_shapes(chosen)]
         rows, mirrored = _rows(file, found, chosen, codes)
     notes, nothing = (*notes, *dict.fromkeys(file.notes)), np.zeros((0, len(found.tree), 4, 4))
     head = JointAnimation(found.tree, nothing, rate, title, notes, (*warnings, *mirrored), file.up)

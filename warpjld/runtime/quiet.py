@@ -30,12 +30,12 @@ def silence_warp() -> None:
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 2)
     try:
-        told = _initialised()
+        lines_written = _initialised()
     finally:
         os.dup2(kept, 2)
         os.close(kept)
-    if told and sys.stderr is not None:
-        for line in told:
+    if lines_written and sys.stderr is not None:
+        for line in lines_written:
             print(f"warning: {line}", file=sys.stderr)
 
 

@@ -113,7 +113,7 @@ class SkinContact:
                 )
             closed = rows[rows["share"] < 1.0]
             if len(closed):
-                worst = found.told(closed[closed["depth"].argmax()])
+                worst = found.record(closed[closed["depth"].argmax()])
                 inside = f"{1e3 * worst.depth:.1f} mm inside {worst.other} as posed" if worst.other else "folded"
                 lines.append(
                     f"{name}: {_frames(len(closed))} closed only until it touches, deepest at frame {worst.frame}: "

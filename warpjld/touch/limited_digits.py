@@ -82,7 +82,7 @@ class LimitedDigits(Sequence[LimitedDigit]):
         rows = self.rows
         return {self._digits[n]: rows[rows["digit"] == n] for n in np.unique(rows["digit"]).tolist()}
 
-    def told(self, row: Any) -> LimitedDigit:
+    def record(self, row: Any) -> LimitedDigit:
         """Record of a row of the structured array."""
         other = self._parts[int(row["other"])] if row["other"] >= 0 else ""
         depth, share, flexion = (float(row[name]) for name in ("depth", "share", "flexion"))
@@ -94,5 +94,5 @@ class LimitedDigits(Sequence[LimitedDigit]):
 
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
-            return [self.told(row) for row in self.rows[index]]
-        return self.told(self.rows[index])
+            return [self.record(row) for row in self.rows[index]]
+        return self.record(self.rows[index])
