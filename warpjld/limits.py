@@ -47,6 +47,8 @@ LIMITS = {
     "text": Limit(10_000, "characters", "a text in a script with its macro parameters put in"),
     "trials": Limit(1_000_000, "trials", "a study"),
     "instants": Limit(100_000, "instants", "a load step"),
+    "reader-bytes": Limit(2 << 30, "bytes", "memory of the process that reads USD or FBX, besides some a byte of it"),
+    "reader-seconds": Limit(600, "seconds", "the process that reads USD or FBX"),
     "elements": Limit(2_000_000, "elements", "a finite-element mesh"),
 }
 """Limits by their names in ``--limit``; environment variables have them in capitals with underscores."""

@@ -37,6 +37,8 @@ def damaged(data: bytes, draw: random.Random) -> bytes:
         ways += [_archive] * 12
     elif data[:6] == b"\x93NUMPY":
         ways += [_array] * 8
+    elif data[:8] == b"PXR-USDC":
+        ways += [_count] * 8
     elif b"\n" in data[:200]:
         ways += [_lines, _lines, _words, _words, _words]
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
@@ -153,6 +155,19 @@ def _array(data: bytes, draw: random.Random) -> bytes:
     return out.getvalue()
 
 
+def _count(data: bytes, draw: random.Random) -> bytes:
+    """Another of the 8-byte numbers by which binary USD states lengths and places."""
+    if len(data) < 32:
+        return _bits(data, draw)
+    for _ in range(100):
+        at = draw.randrange(len(data) - 8)
+        (value,) = struct.unpack_from("<Q", data, at)
+        if 0 < value < 1 << 24:
+            break
+    value = draw.choice((0, value + 1, value - 1, 1 << 20, 1 << 28, 1 << 30, 1 << 32, 1 << 40, (1 << 64) - 1))
+    return data[:at] + struct.pack("<Q", value) + data[at + 8 :]
+
+
 def _archive(data: bytes, draw: random.Random) -> bytes:
     """A member of a zip archive damaged, gone, doubled or blown up."""
     try:
@@ -160,6 +175,7 @@ def _archive(data: bytes, draw: random.Random) -> bytes:
             if sum(member.file_size for member in file.infolist()) > 1 << 20:
                 return _bits(data, draw)  # blown up already
             members = {name: file.read(name) for name in file.namelist()}
+            packing = max((member.compress_type for member in file.infolist()), default=zipfile.ZIP_STORED)
     except Exception:  # damaged already
         return _bits(data, draw)
     if not members:
@@ -173,12 +189,22 @@ def _archive(data: bytes, draw: random.Random) -> bytes:
     elif what < 0.3:
         members |= {f"more{k}.npy": members[name] for k in range(draw.choice((3, 200)))}
     elif members[name]:
-        members[name] = draw.choice((_array, _array, _bits, _cut))(members[name], draw)
+        members[name] = _member(members[name], draw)
     out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as file:
+    with zipfile.ZipFile(out, "w", packing) as file:
         for key, content in members.items():
             file.writestr(key, content)
     return out.getvalue()
+
+
+def _member(data: bytes, draw: random.Random) -> bytes:
+    if data[:6] == b"\x93NUMPY":
+        return draw.choice((_array, _array, _bits, _cut))(data, draw)
+    if data[:8] == b"PXR-USDC":
+        return draw.choice((_count, _count, _bits, _cut))(data, draw)
+    if data[:1] == b"{":
+        return draw.choice((_json, _json, _json, _number, _bits, _cut))(data, draw)
+    return draw.choice((_number, _words, _words, _bits, _cut, _doubled))(data, draw)
 
 
 def _lines(data: bytes, draw: random.Random) -> bytes:

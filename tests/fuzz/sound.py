@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.finger import finger
 from tests.fuzz.sound_more import MORE
+from tests.fuzz.sound_packed import PACKED
 from tests.fuzz.sound_state import read_state, write_state
 from tests.io import fbx_text
 from tests.motion import skinned_files
@@ -338,6 +339,7 @@ KINDS: dict[str, tuple[Callable[[Path], None], Callable[[Path], object]]] = {
     "state.npz": (write_state, read_state),
     "a.jld": (_script, _checked_script),
     **MORE,
+    **PACKED,
 }
 """How a sound file of each kind is written, and what reads it."""
 

@@ -9,6 +9,7 @@ import resource
 import shutil
 import signal
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -28,6 +29,8 @@ _WAIT = 10 * SECONDS
 """Seconds by the clock: what waits for others, or for nothing, ends too."""
 MEMORY = 3 << 30
 """Bytes that a process may come to hold."""
+_PATIENCE = 8
+"""Times as long as its processor time a turn may take by the clock: what reads USD counts in a process of its own."""
 _BATCH = 25  # inputs of one way of making them before the other has its turn
 _ADDRESSES = 8 << 30  # Warp's compiler maps more than it uses
 
@@ -69,6 +72,7 @@ def forked(name: str, start: int, seconds: float, folder: Path) -> tuple[int, li
 def _try_many(name: str, start: int, seconds: float, folder: Path, tell: Callable[[dict[str, object]], None]) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
+    os.environ["WARPJLD_LIMIT_READER_SECONDS"] = str(SECONDS)
     path = sound(name, folder)
     data = path.read_bytes()
     KINDS[name][1](path)  # imports and kernels: no input's fault
@@ -91,10 +95,14 @@ def _try_many(name: str, start: int, seconds: float, folder: Path, tell: Callabl
             shutil.copy(path, kept)
             tell({"input": str(kept), "told": told})
 
-    until, batch = _spent() + seconds, 0
-    while _spent() < until:  # always the same inputs, of which a faster machine tries more
+    until, late, batch = _spent() + seconds, time.monotonic() + _PATIENCE * seconds, 0
+
+    def goes_on() -> bool:
+        return _spent() < until and time.monotonic() < late
+
+    while goes_on():  # always the same inputs, of which a faster machine tries more
         for k in range(_BATCH):
-            if _spent() < until:
+            if goes_on():
                 attempt(damaged(data, random.Random(f"{start} {batch} {k}")))
         if name == "a.jld":
             _by_grammar(1000 * start + batch, lambda text: attempt(text.encode("utf-8", "surrogatepass")))

@@ -4,11 +4,13 @@ As a script it runs in a process that can be killed: ``python -m tests.study.dic
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import signal
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,6 +77,14 @@ class Dice:
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         (folder / "die.txt").write_text(str(outcome.values["thrown"]))
         return [folder / "die.txt"]
+
+
+def edit_trial(file: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change the content of a stored trial, with a checksum that fits."""
+    content = json.loads(file.read_bytes().partition(b"\n")[0])
+    change(content)
+    line = json.dumps(content).encode()
+    file.write_bytes(line + b"\n" + hashlib.blake2b(line, digest_size=16).hexdigest().encode())
 
 
 def _first(mark: Path) -> bool:

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from tests.study.dice import Dice
+from tests.study.dice import Dice, edit_trial
 from tests.study.heard import Heard
 from warpjld.errors import InputError, MissingExtraError, WarpjldError
 from warpjld.study import run_study
@@ -111,9 +111,7 @@ def test_a_trial_that_always_kills_its_worker_is_a_row(whole: Path, tmp_path: Pa
 def test_a_machine_whose_bits_differ_is_refused(tmp_path: Path) -> None:
     run_study(Dice(trials=9), tmp_path, processes=1, table="csv")
     kept = tmp_path / "trials" / "0000" / "0000004.json"  # of twelve trials 0, 4 and 8 are the canaries
-    content = json.loads(kept.read_text())
-    content["row"]["thrown"] += 1e-15
-    kept.write_text(json.dumps(content))
+    edit_trial(kept, lambda content: content["row"].update(thrown=content["row"]["thrown"] + 1e-15))
     with pytest.raises(WarpjldError, match=r"no machine of the cluster is left.*: trial 4 gives other bits"):
         run_study(Dice(trials=12), tmp_path, table="csv", ray="local")
     result = run_study(Dice(trials=12), tmp_path, table="csv", ray="local", allow_mixed=True)

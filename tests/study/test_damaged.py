@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.study.dice import Dice
+from tests.study.dice import Dice, edit_trial
 from warpjld.study import run_study
 from warpjld.study.summary import write_summary
 
@@ -35,13 +34,21 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_damaged_trials_run_again_and_it_is_said(done: Path, damage: str) -> None:
     before = (done / "table.csv").read_bytes()
     file = done / "trials" / "0000" / "0000003.json"
-    content = json.loads(file.read_text())
-    DAMAGE[damage](content)
-    file.write_text(json.dumps(content))
+    edit_trial(file, DAMAGE[damage])
     again = run_study(Dice(trials=4), done, processes=1, table="csv")
     assert again.ran == 1
     assert "1 trials in" in again.notes[0]
     assert again.notes[0].endswith("are damaged and run again: 3")
+    assert (done / "table.csv").read_bytes() == before
+
+
+def test_a_digit_that_changed_is_noticed(done: Path) -> None:
+    before = (done / "table.csv").read_bytes()
+    file = done / "trials" / "0000" / "0000002.json"
+    content = file.read_bytes()
+    place = content.index(b'"thrown": 0.') + len(b'"thrown": 0.')
+    file.write_bytes(content[:place] + (b"1" if content[place : place + 1] != b"1" else b"2") + content[place + 1 :])
+    assert run_study(Dice(trials=4), done, processes=1, table="csv").ran == 1
     assert (done / "table.csv").read_bytes() == before
 
 

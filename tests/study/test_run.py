@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.study.dice import Dice
+from tests.study.dice import Dice, edit_trial
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.study import rerun_trial, run_study
 from warpjld.tables.files import read_table
@@ -158,9 +158,7 @@ def test_rerun_repeats_a_trial_exactly(whole: Path) -> None:
 def test_rerun_tells_what_differs(tmp_path: Path) -> None:
     run_study(Dice(trials=2), tmp_path, processes=1, table="csv")
     shard = tmp_path / "trials" / "0000" / "0000001.json"
-    content = json.loads(shard.read_text())
-    content["row"]["thrown"] += 1e-16 + np.spacing(content["row"]["thrown"])
-    shard.write_text(json.dumps(content))
+    edit_trial(shard, lambda content: content["row"].update(thrown=np.nextafter(content["row"]["thrown"], 2.0)))
     assert rerun_trial(Dice(trials=2), tmp_path, 1).differences == ("thrown",)
 
 

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from urllib.parse import unquote
 
+from warpjld.errors import InputError
 from warpjld.files.manifest import file_hash
 
 __all__ = ["content_hash", "files_of"]
@@ -59,16 +60,9 @@ def _buffers(path: Path) -> list[Path]:
 
 
 def _layers(path: Path) -> list[Path]:
-    try:
-        from pxr import Sdf, UsdUtils
-    except ImportError:
-        return []
-    from warpjld.io.usd.stage import check_usd_content
+    from warpjld.io.usd.separate_rig import layers_of
 
     try:
-        check_usd_content(path)  # its reader refuses it with the reason
-        layers, _, _ = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
-    except Exception:  # whatever its plug-ins raise
+        return layers_of(path)
+    except InputError:  # its reader refuses it with the reason
         return []
-    found = {Path(layer.realPath).resolve() for layer in layers if layer.realPath} - {path.resolve()}
-    return sorted(found)

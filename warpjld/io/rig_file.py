@@ -117,7 +117,7 @@ def _read(path: Path, skeleton: str | Path | None, points: str | Path | None) ->
         return read(path)
 
 
-_USD = ("warpjld.io.usd.skin", "read_usd_rig")
+_USD = ("warpjld.io.usd.separate_rig", "load_usd_rig")
 _READERS = {
     ".glb": ("warpjld.io.gltf.skin", "read_gltf_rig"),
     ".gltf": ("warpjld.io.gltf.skin", "read_gltf_rig"),

@@ -56,7 +56,7 @@ def choose_animation(wanted: str | None, names: tuple[str, ...], path: Path) -> 
 
 
 _GLTF = ("warpjld.motion.gltf_animation", "gltf_animation_names")
-_USD = ("warpjld.motion.usd_animation", "usd_animation_names")
+_USD = ("warpjld.motion.separate_usd", "load_usd_animation_names")
 _LISTERS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,

@@ -168,7 +168,7 @@ def _retargeted(clip: Clip, rig: Rig, rate: float | None, flips: list[str]) -> L
 
 
 _GLTF = ("warpjld.motion.gltf_animation", "read_gltf_animation")
-_USD = ("warpjld.motion.usd_animation", "read_usd_animation")
+_USD = ("warpjld.motion.separate_usd", "load_usd_animation")
 _ANIMATIONS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,

@@ -6,15 +6,16 @@ contain stay at rest; if the skeleton or an ancestor is animated, its joints mov
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.files.spilled_rows import SpilledRows
+from warpjld.geometry.rotations import matrices
 from warpjld.io.unique_names import unique_names
 from warpjld.limits import check_limit
 from warpjld.motion.animations import choose_animation
@@ -248,10 +249,10 @@ def _locals(
     rest = skeleton.local_rest[own]
     side = np.where(np.linalg.det(rest[:, :3, :3]) < 0.0, -1.0, 1.0)
     lengths = side[:, None] * np.linalg.norm(rest[:, :3, :3], axis=1)
-    still = (rest[:, :3, 3], Rotation.from_matrix(rest[:, :3, :3] / lengths[:, None]).as_quat(), lengths)
+    still = (lambda: rest[:, :3, 3], lambda: _quaternions(rest[:, :3, :3] / lengths[:, None]), lambda: lengths)
     moves, turns, scales = (
-        _samples(file, animation, attribute, codes, values)
-        for attribute, values in zip(_attributes(animation), still, strict=True)
+        _samples(file, animation, attribute, codes, (len(own), width), values)
+        for attribute, width, values in zip(_attributes(animation), (3, 4, 3), still, strict=True)
     )
     norm = np.linalg.norm(turns, axis=-1)
     if not (norm[:, known] > 0.0).all():
@@ -260,7 +261,7 @@ def _locals(
             f"animation '{animation.GetName()}': joint '{_joints(animation)[joint]}' has no rotation at frame {frame}",
             path=file.path,
         )
-    linear = Rotation.from_quat(turns[:, known].reshape(-1, 4)).as_matrix().reshape(len(codes), -1, 3, 3)
+    linear = matrices(turns[:, known])
     amount = scales[:, known]
     amount = np.where(np.abs(amount) < _TINY, _TINY, amount)[..., None, :]
     out[..., :3, 3][:, own[known]] = moves[:, known]
@@ -272,18 +273,29 @@ def _locals(
     return out, unmirrored
 
 
+def _quaternions(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation  # it takes longer to import than OpenUSD, and is seldom needed
+
+    return np.asarray(Rotation.from_matrix(turns).as_quat())
+
+
 def _samples(
-    file: UsdFile, animation: Any, attribute: Any, codes: NDArray[np.float64], still: NDArray[np.float64]
+    file: UsdFile,
+    animation: Any,
+    attribute: Any,
+    codes: NDArray[np.float64],
+    shape: tuple[int, int],
+    still: Callable[[], NDArray[np.float64]],
 ) -> NDArray[np.float64]:
-    """Values of an attribute at time codes, shape (F, J, 3) or (F, J, 4); ``still`` if it has none."""
+    """Values of an attribute at time codes, shape (F, J, 3) or (F, J, 4); ``still()`` if it has none."""
     at = codes.tolist() if attribute.ValueMightBeTimeVarying() else codes[:1].tolist()
     values = []
     for code in at:
         value = attribute.Get(code)
-        array = still if value is None else np.array(value, dtype=np.float64)
-        if array.shape != still.shape:
+        array = still() if value is None else np.array(value, dtype=np.float64)
+        if array.shape != shape:
             raise InputError(
-                f"animation '{animation.GetName()}': want {len(still)} {attribute.GetName()}, one for each of its "
+                f"animation '{animation.GetName()}': want {shape[0]} {attribute.GetName()}, one for each of its "
                 f"joints, got {len(array)}",
                 path=file.path,
             )

@@ -1,8 +1,9 @@
-"""Storage of trials while a study runs: one JSON file per trial, written atomically."""
+"""Storage of trials while a study runs: one JSON file per trial with a checksum, written atomically."""
 
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 import os
 from collections.abc import Iterator, Sequence
@@ -32,25 +33,34 @@ class Shard:
     seconds: float
 
     def packed(self) -> bytes:
-        """Bytes of its file."""
+        """Bytes of its file: a line of JSON, and one with its checksum."""
         content = {
             "trial": self.trial,
             "row": self.row,
             "arrays": {name: _packed(array) for name, array in self.arrays.items()},
             "seconds": self.seconds,
         }
-        return json.dumps(content, allow_nan=True, ensure_ascii=False).encode("utf-8")
+        line = json.dumps(content, allow_nan=True, ensure_ascii=False).encode("utf-8")
+        return line + b"\n" + _checksum(line)
 
     @staticmethod
     def unpacked(content: bytes) -> Shard:
         """Inverse of `packed`; damaged bytes raise one of the exceptions in ``_DAMAGED``."""
-        found = json.loads(content.decode("utf-8"))
+        line, _, checksum = content.rpartition(b"\n")
+        if checksum != _checksum(line):
+            raise ValueError("its checksum is another")
+        found = json.loads(line.decode("utf-8"))
         arrays = {name: _unpacked(packed) for name, packed in found["arrays"].items()}
         return Shard(int(found["trial"]), dict(found["row"]), arrays, float(found["seconds"]))
 
     def results(self) -> bytes:
         """Bytes of its results without the time; these are the same wherever the trial is run."""
         return replace(self, seconds=0.0).packed()
+
+
+def _checksum(line: bytes) -> bytes:
+    """A changed digit would go unnoticed otherwise, and change the study's results."""
+    return hashlib.blake2b(line, digest_size=16).hexdigest().encode()
 
 
 class Shards:

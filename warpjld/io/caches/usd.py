@@ -12,7 +12,7 @@ from warpjld.errors import MissingExtraError
 from warpjld.geometry.surface import Surface
 from warpjld.io.caches.cache import Cache
 
-__all__ = ["UsdCache", "extent_of", "write_texture_coordinates"]
+__all__ = ["UsdCache", "extent_of", "save_layer", "write_texture_coordinates"]
 
 _FLUSH_BYTES = 32 << 20  # bytes of time samples in memory after which the layer is saved
 
@@ -52,18 +52,27 @@ class UsdCache(Cache):
         self._close()
 
     def _save(self) -> None:
-        from pxr import Tf
-
-        try:
-            saved = self._stage.GetRootLayer().Save()
-        except Tf.ErrorException as error:  # such as for a full disk
-            raise OSError("USD could not save the layer: is the disk full?") from error
-        if not saved:
-            raise OSError("USD could not save the layer")
+        save_layer(self._stage)
         self._pending = 0
 
     def _close(self) -> None:
         self._stage = self._mesh = None
+
+
+def save_layer(stage: Any) -> None:
+    """Write a stage's root layer; of a binary one this frees the memory of its time samples.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    from pxr import Tf
+
+    try:
+        saved = stage.GetRootLayer().Save()
+    except Tf.ErrorException as error:  # such as for a full disk
+        raise OSError("USD could not save the layer: is the disk full?") from error
+    if not saved:
+        raise OSError("USD could not save the layer")
 
 
 def _build_stage(cache: Cache, file: Path) -> tuple[Any, Any]:

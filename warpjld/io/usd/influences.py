@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from warpjld.errors import InputError
 from warpjld.io.usd.mesh import default_or_first
@@ -124,6 +123,8 @@ def _normalised(
     if bare.all():
         raise InputError(f"{where}: no vertex has any weight", path=file.path)
     if bare.any():
+        from scipy.spatial import cKDTree  # it takes longer to import than OpenUSD, and is seldom needed
+
         nearest = np.flatnonzero(~bare)[cKDTree(points[~bare]).query(points[bare])[1]]
         index, weight = index.copy(), weight.copy()
         index[bare], weight[bare], total[bare] = index[nearest], weight[nearest], total[nearest]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.io.usd.stage import UsdFile, usd_matrices
+from warpjld.limits import check_limit
 from warpjld.skeleton.recognise.tree import SourceTree
 
 __all__ = ["UsdSkeleton", "UsdSkeletons", "concatenated", "read_skeletons"]
@@ -87,6 +88,7 @@ def read_skeletons(file: UsdFile) -> UsdSkeletons | None:
     for prim, meshes in found:
         first = skeletons[-1].first + len(skeletons[-1].tokens) if skeletons else 0
         skeletons.append(_skeleton(file, prim, tuple(meshes), first))
+        check_limit("joints", first + len(skeletons[-1].tokens), path=file.path)
     if not skeletons:
         return None
     parents = [np.where(one.parents < 0, -1, one.parents + one.first) for one in skeletons]
@@ -128,6 +130,7 @@ def _skeleton(file: UsdFile, prim: Any, meshes: tuple[Any, ...], first: int) -> 
     tokens = tuple(str(token) for token in skeleton.GetJointsAttr().Get() or ())
     if not tokens:
         raise InputError(f"skeleton '{path}' has no joints", path=file.path)
+    check_limit("joints", len(tokens), of=f"skeleton '{path}'", path=file.path)
     if len(set(tokens)) != len(tokens):
         twice = next(token for token, count in Counter(tokens).items() if count > 1)
         raise InputError(f"skeleton '{path}' has two joints '{twice}'", path=file.path)

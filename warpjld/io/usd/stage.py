@@ -48,7 +48,11 @@ class UsdFile:
         """All active, defined, loaded prims, including those of instances."""
         from pxr import Usd
 
-        return list(Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()))
+        found = []
+        for prim in Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()):  # instances of instances multiply
+            found.append(prim)
+            check_limit("nodes", len(found), path=self.path)
+        return found
 
 
 def check_usd_content(path: Path) -> None:

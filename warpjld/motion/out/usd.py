@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import MissingExtraError
 from warpjld.geometry.rotations import upright
-from warpjld.io.caches.usd import write_texture_coordinates
+from warpjld.io.caches.usd import save_layer, write_texture_coordinates
 from warpjld.io.usd.skeletons import concatenated
 from warpjld.motion.out.baked_skin import BakedSkin
 from warpjld.motion.out.local_motion import local_motion, rest_scales
@@ -34,6 +34,8 @@ from warpjld.skeleton import Poses
 __all__ = ["write_usd"]
 
 _SHEARED = 1e-3  # smallest shear that is reported, per scale of the joint
+_PENDING = 400_000
+"""Transforms in memory after which a binary layer is saved: about 32 MB."""
 _SAME = 1e-9  # tolerance of the placing, per unit of the file
 
 
@@ -70,12 +72,12 @@ def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSk
     animation = UsdSkel.Animation.Define(stage, _below(stage, root, timing.name))
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     animation.CreateJointsAttr(skeleton.GetJointsAttr().Get())
-    sheared = _animate(animation, motion, space, timing.start_frame)
+    binary = path.suffix.lower() != ".usda"
+    sheared = _animate(animation, motion, space, timing.start_frame, stage if binary else None)
     mesh = _surface(stage, root, skeleton, rig, motion, space, baked, notes)
     if baked is not None and baked.names:
         _blend_shapes(stage, mesh, animation, rig, space, baked, timing.start_frame)
-    if not stage.GetRootLayer().Save():
-        raise OSError("USD could not save the layer")
+    save_layer(stage)
     bent = [motion.tree.names[j] for j in np.flatnonzero(sheared > _SHEARED)]
     warning = (
         f"{len(bent)} joints are below one scaled by different factors ({', '.join(bent[:4])}): USD cannot hold the "
@@ -200,8 +202,16 @@ def _tokens(names: list[str], parents: NDArray[np.int64]) -> list[str]:
     return out
 
 
-def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int) -> NDArray[np.float64]:
-    """Write samples of all frames; returns the shear that is lost, as ``LocalMotion.sheared``."""
+def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int, saved: Any | None) -> NDArray[np.float64]:
+    """Write samples of all frames; returns the shear that is lost, as ``LocalMotion.sheared``.
+
+    Args:
+        animation: The ``SkelAnimation``.
+        motion: The motion.
+        space: Joints at rest.
+        start: Time code of the first frame.
+        saved: Stage that is saved every few thousand frames, which frees their memory; None: not in between.
+    """
     from pxr import Vt
 
     translations, rotations = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()
@@ -209,7 +219,7 @@ def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int) ->
     given = np.ones(len(space.order), dtype=bool)
     sheared = np.zeros(len(given))
     last = np.tile([0.0, 0.0, 0.0, 1.0], (len(given), 1))
-    back, bind = np.linalg.inv(space.to_rig), space.bind
+    back, bind, pending = np.linalg.inv(space.to_rig), space.bind, 0
     for block in motion.blocks():
         worlds = back @ motion.moves(block)[:, space.order] @ space.to_rig @ bind
         local = local_motion(worlds, space.parents, space.local, space.scales, given)
@@ -220,6 +230,10 @@ def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int) ->
             time = start + block.start + frame
             translations.Set(Vt.Vec3fArray.FromNumpy(move.astype(np.float32)), time)
             rotations.Set(Vt.QuatfArray.FromNumpy(last.astype(np.float32)), time)
+        pending += len(local.translations) * len(given)
+        if saved is not None and pending > _PENDING:
+            save_layer(saved)
+            pending = 0
     return sheared
 
 

@@ -1,0 +1,102 @@
+"""Calls of functions in a process of their own, with limits on memory and time.
+
+Libraries written in C++ may crash on a damaged file, or allocate what it announces. A process that crashes, needs too
+much memory or does not end in time is an error of the file, in one line. One process is kept for the calls that follow,
+since starting it takes longer than reading a usual file; it ends when it is idle, or with this process.
+
+Requests and answers are lines of JSON over pipes; arrays are left in a folder. Nothing is unpickled.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from warpjld.errors import InputError
+from warpjld.limits import limit, variable
+from warpjld.runtime.separate_process import LATE, running_process
+from warpjld.runtime.separate_program import too_much
+
+__all__ = ["Answer", "separately"]
+
+_TRIES = 2  # a process may end, being idle, just when it is asked
+_lock = threading.RLock()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a call gave.
+
+    Attributes:
+        value: The function's result.
+        folder: Where it left files; they last as long as the context of ``separately``.
+    """
+
+    value: Any
+    folder: Path
+
+
+@contextmanager
+def separately(place: tuple[str, str], path: Path, kind: str, *arguments: object, per_byte: int) -> Iterator[Answer]:
+    """Result of ``function(folder, path, *arguments)``, called in a process of its own.
+
+    Args:
+        place: The function's module and name. It writes arrays to files in the folder, and returns the rest of its
+            result as JSON has it.
+        path: The file that it reads.
+        kind: Expected kind of file, for messages.
+        arguments: Further arguments, as JSON has them.
+        per_byte: Memory that it may use for each byte of the file, besides the limit ``reader-bytes``.
+
+    Raises:
+        InputError: As the function does; or the process crashed, needed too much memory, or did not end in time.
+    """
+    memory = limit("reader-bytes") + per_byte * _size(path)
+    request = {
+        "place": place,
+        "path": str(path.absolute()),
+        "kind": kind,
+        "arguments": arguments,
+        "memory": memory,
+        "limits": {name: value for name, value in os.environ.items() if name.startswith(variable(""))},
+    }
+    with _lock:
+        yield _answer(json.dumps(request), path, kind, memory)
+
+
+def _answer(request: str, path: Path, kind: str, memory: int) -> Answer:
+    seconds, code = limit("reader-seconds"), 0
+    for _ in range(_TRIES):
+        process = running_process()
+        line = process.asked(request, seconds)
+        if line.endswith("\n"):
+            told = json.loads(line)
+            if "refused" in told:
+                raise _refusal(told["refused"], path)
+            return Answer(told["value"], process.folder)
+        code = process.end()
+        if line == LATE:
+            why = f"not done after {seconds} s (raise it by warpjld --limit reader-seconds=… or "
+            raise InputError(f"cannot be read as {kind}: {why}{variable('reader-seconds')})", path=path)
+        if code:
+            break
+    why = f"the process that reads it ends with code {code}: the file is damaged, or "
+    raise InputError(too_much(kind, memory, why).message, path=path)
+
+
+def _refusal(told: dict[str, Any], path: Path) -> InputError:
+    own = told["path"] in (None, str(path.absolute()))
+    return InputError(told["message"], path=path if own else told["path"], line=told["line"], column=told["column"])
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except (OSError, ValueError):  # the function says what is wrong with it
+        return 0
