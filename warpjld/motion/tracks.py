@@ -41,17 +41,23 @@ class Track:
     def __init__(self, channel: str) -> None:
         self.channel = channel
         self._keys: dict[float, Key] = {}
-        self._spline: Spline | None = None
+        self._made: list[Spline] = []  # the spline through these keys, once it was asked for
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Track:
+        """A track of its own. Keys never change, and the spline through them is made once for both."""
+        other = memo[id(self)] = Track(self.channel)
+        other._keys, other._made = dict(self._keys), self._made
+        return other
 
     def set(self, key: Key) -> None:
         """Add a key, or replace the one at its frame."""
         self._keys[key.frame] = key
-        self._spline = None
+        self._made = []
 
     def remove(self, frame: float) -> None:
         """Forget the key at a frame, if there is one."""
         self._keys.pop(frame, None)
-        self._spline = None
+        self._made = []
 
     @property
     def keys(self) -> tuple[Key, ...]:
@@ -61,10 +67,10 @@ class Track:
     @property
     def spline(self) -> Spline:
         """The spline through the keys."""
-        if self._spline is None:
+        if not self._made:
             rows = ((k.frame, k.value, k.tension, k.continuity, k.bias) for k in self.keys)
-            self._spline = Spline(*zip(*rows, strict=True))
-        return self._spline
+            self._made.append(Spline(*zip(*rows, strict=True)))
+        return self._made[0]
 
 
 @dataclass(frozen=True)

@@ -167,6 +167,7 @@ class Performance:
         finally:
             self._quiet = False
         self._done = self._done[:number]
+        self._keep(number)  # an edit is often followed by another at the same place, as while a slider is dragged
 
     def _go_on_from_known(self, nodes: tuple[Node, ...]) -> None:
         """Continue from the cached snapshot that covers the most statements, if it covers more than are done."""

@@ -70,6 +70,7 @@ class StudioState:
         self.surfaces = Surfaces(device)
         self.performance = Performance(folder, say=self.messages.append, within=within)
         self._actor: str | None = None
+        self._angles: tuple[object, dict[str, float]] | None = None
         self._run()
 
     # ---- state shown --------------------------------------------------------------------------------------------
@@ -133,10 +134,14 @@ class StudioState:
         at = self.frame if frame is None else frame
         if actor is None:
             return {}
-        return {
-            name: float(np.clip(np.degrees(actor.value(name, at)), low, high))
-            for name, (low, high) in self.channels().items()
-        }
+        key = (self.document.text, actor, at)  # a scene changes only with its text
+        if self._angles is None or self._angles[0] != key:
+            values = {
+                name: float(np.clip(np.degrees(actor.value(name, at)), low, high))
+                for name, (low, high) in self.channels().items()
+            }
+            self._angles = key, values
+        return dict(self._angles[1])
 
     def shown(self) -> list[Shown]:
         """Surfaces at the current frame, of the preview, the contact solution of this script, or else the scene."""
