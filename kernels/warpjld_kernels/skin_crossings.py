@@ -2,27 +2,60 @@
 
 import warp as wp
 
-from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.lanes import VECTORISED, prelude
 from warpjld_kernels.posed_skin import PosedSkins
 from warpjld_kernels.triangle_tree import WAITING, WIDTH
 
 wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
+MOST_PARTS = 64
+"""Parts of a skin that are told from one another: bits of a mask."""
+
 
 @wp.func_native(
-    f"""
+    prelude(WIDTH)
+    + f"""
     const int W = {WIDTH};
     const wp::vec_t<3, float>* at = skins.points.data + size_t(pose) * skins.points.shape[1];
     const wp::vec_t<3, int>* faces = skins.faces.data;
-    const wp::vec_t<3, int> own = faces[face];
+    const int* first_face = first_of_part.data;
+    const int parts = counts.shape[1] < {MOST_PARTS} ? counts.shape[1] : {MOST_PARTS};
+    // boxes of the other parts, side by side; of those that are not asked for nothing overlaps
+    float lows[3][{MOST_PARTS}], highs[3][{MOST_PARTS}];
+    for (int k = 0; k < (parts + W - 1) / W * W; ++k) {{
+        for (int i = 0; i < 3; ++i) {{ lows[i][k] = 3e38f; highs[i][k] = -3e38f; }}
+        if (k >= parts || !(others >> k & 1)) continue;
+        for (int n = first_face[k]; n < first_face[k + 1]; ++n)
+            for (int c = 0; c < 3; ++c) {{
+                const wp::vec_t<3, float> x = at[faces[by_part.data[n]][c]];
+                for (int i = 0; i < 3; ++i) {{
+                    lows[i][k] = x[i] < lows[i][k] ? x[i] : lows[i][k];
+                    highs[i][k] = x[i] > highs[i][k] ? x[i] : highs[i][k];
+                }}
+            }}
+    }}
+    int* own_counts = counts.data + size_t(task) * counts.shape[1];
+    const int* allowed = most.data + size_t(task) * most.shape[1];
+    wp::uint64 asked = others;
+    for (int n = first_face[own_part]; asked && n < first_face[own_part + 1]; ++n) {{
+    const wp::vec_t<3, int> own = faces[by_part.data[n]];
     float low[3], high[3];
     for (int i = 0; i < 3; ++i) {{
         const float a = at[own[0]][i], b = at[own[1]][i], c = at[own[2]][i];
         low[i] = a < b ? a : b; low[i] = c < low[i] ? c : low[i];
         high[i] = a > b ? a : b; high[i] = c > high[i] ? c : high[i];
     }}
+    wp::uint64 near = 0;
+    for (int base = 0; base < parts; base += N) {{
+        Floats past = low[0] - *(const Stored*)(highs[0] + base);
+        for (int i = 1; i < 3; ++i) past = HIGHEST(past, low[i] - *(const Stored*)(highs[i] + base));
+        for (int i = 0; i < 3; ++i) past = HIGHEST(past, *(const Stored*)(lows[i] + base) - high[i]);
+        near |= wp::uint64(LANES_OF(past <= 0.0f)) << base;
+    }}
+    near &= asked;
+    if (!near) continue;
     // node, or leaf as -1 - leaf, of the tree of this pose
-    int stack[{WAITING}], count = 1, found = 0;
+    int stack[{WAITING}], count = 1;
     const int first_node = pose * skins.nodes;
     stack[0] = skins.tree.root.data[pose];
     while (count) {{
@@ -31,29 +64,34 @@ wp.set_module_options({**VECTORISED, "max_unroll": 1})
             const float* box = skins.tree.boxes.data + 6 * W * size_t(node);
             const wp::uint64* inside = skins.inside.data + size_t(node - first_node) * W;
             const int first = skins.tree.child.data[node], step = first < 0 ? -1 : 1;
-            const int held = skins.held.data[node - first_node];
-            for (int l = 0; l < held; ++l)
-                if ((inside[l] & others) && low[0] <= box[3 * W + l] && box[l] <= high[0]
-                    && low[1] <= box[4 * W + l] && box[W + l] <= high[1]
-                    && low[2] <= box[5 * W + l] && box[2 * W + l] <= high[2])
-                    stack[count++] = first + step * l;
+            for (int base = 0; base < W; base += N) {{
+                Floats past = low[0] - *(const Stored*)(box + 3 * W + base);
+                for (int i = 1; i < 3; ++i) past = HIGHEST(past, low[i] - *(const Stored*)(box + W * (3 + i) + base));
+                for (int i = 0; i < 3; ++i) past = HIGHEST(past, *(const Stored*)(box + W * i + base) - high[i]);
+                for (unsigned int met = LANES_OF(past <= 0.0f); met; met &= met - 1) {{
+                    const int l = base + FIRST_OF(met);
+                    if (inside[l] & near) stack[count++] = first + step * l;
+                }}
+            }}
             continue;
         }}
         const int* number = skins.tree.face.data + W * size_t(-1 - node);
-        for (int l = 0; l < W; ++l) {{
+        const float* leaf = skins.tree.corners.data + 9 * W * size_t(-1 - node);
+        for (int base = 0; base < W; base += N) {{
+        Floats past = Floats(-1.0f);
+        for (int i = 0; i < 3; ++i) {{
+            const Floats a = *(const Stored*)(leaf + W * i + base);
+            const Floats b = *(const Stored*)(leaf + W * (3 + i) + base);
+            const Floats c = *(const Stored*)(leaf + W * (6 + i) + base);
+            past = HIGHEST(past, HIGHEST(LOWEST(LOWEST(a, b), c) - high[i], low[i] - HIGHEST(HIGHEST(a, b), c)));
+        }}
+        for (unsigned int met = LANES_OF(past <= 0.0f); met; met &= met - 1) {{
+            const int l = base + FIRST_OF(met);
             const int other = number[l];
-            if (l && other == number[l - 1]) break;
+            if (l && other == number[l - 1]) break;  // the last leaf is filled up with its last triangle
             const int part = skins.part.data[other];
-            if (part < 0 || !(others >> part & 1)) continue;
+            if (part < 0 || !(near >> part & 1)) continue;
             const wp::vec_t<3, int> its = faces[other];
-            int apart = 0;
-            for (int i = 0; i < 3; ++i) {{
-                const float a = at[its[0]][i], b = at[its[1]][i], c = at[its[2]][i];
-                float least = a < b ? a : b; least = c < least ? c : least;
-                float most = a > b ? a : b; most = c > most ? c : most;
-                apart |= least > high[i] || most < low[i];
-            }}
-            if (apart) continue;
             int shared = 0, from_own = 0, from_its = 0;
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
@@ -103,22 +141,31 @@ wp.set_module_options({**VECTORISED, "max_unroll": 1})
                         || (turns[0] <= 0.0 && turns[1] <= 0.0 && turns[2] <= 0.0);
                 }}
             }}
-            if (crosses) {{ counts.data[size_t(task) * counts.shape[1] + part] += 1; ++found; }}
+            if (crosses && ++own_counts[part] > allowed[part]) {{
+                asked = enough ? 0 : asked & ~(wp::uint64(1) << part);
+                near &= asked;
+                if (!near) count = 0;
+            }}
+        }}
         }}
     }}
-    return found;
+    }}
 """
 )
 def crossings_of(
     skins: PosedSkins,
     pose: int,
-    face: int,
+    own_part: int,
     others: wp.uint64,
+    first_of_part: wp.array(dtype=wp.int32),
+    by_part: wp.array(dtype=wp.int32),
     scale: float,
     task: int,
+    most: wp.array2d(dtype=wp.int32),
+    enough: bool,
     counts: wp.array2d(dtype=wp.int32),
-) -> int:
-    """Count the triangles of other parts that intersect one, by part, unless they share an edge."""
+):
+    """Count the pairs of intersecting triangles of a part and of others, by other part, unless they share an edge."""
 
 
 @wp.kernel
@@ -132,11 +179,14 @@ def count_crossings(
     first_of_part: wp.array(dtype=wp.int32),
     by_part: wp.array(dtype=wp.int32),
     scale: float,
+    # counting ends for a part beyond this number; or, with ``enough``, for all parts
+    most: wp.array2d(dtype=wp.int32),
+    enough: bool,
     # out
     counts_out: wp.array2d(dtype=wp.int32),
 ):
     """Numbers of intersecting triangle pairs between one part and others of a posed skin."""
     task = wp.tid()
-    part = part_of[task]
-    for n in range(first_of_part[part], first_of_part[part + 1]):
-        crossings_of(skins, pose_of[task], by_part[n], others[task], scale, task, counts_out)
+    crossings_of(
+        skins, pose_of[task], part_of[task], others[task], first_of_part, by_part, scale, task, most, enough, counts_out
+    )

@@ -62,8 +62,8 @@ def keep_apart(
     going = hands
     for _ in order:
         rows, way = np.repeat(going, len(_WAY)), np.tile(_WAY, len(going))
-        now = skin.crossings(skins(rows, way, gone[rows])).reshape(len(going), len(_WAY), len(names), len(names))
-        worse = np.asarray((now > before[going][:, None]).any(axis=3))[:, :, label]
+        more = skin.cross_more(skins(rows, way, gone[rows]), before[rows])
+        worse = np.asarray(more.any(axis=2)).reshape(len(going), len(_WAY), len(names))[:, :, label]
         crossing = np.asarray(worse.any(axis=1))
         affected = np.asarray(crossing.any(axis=1))
         going, worse, crossing = going[affected], worse[affected], crossing[affected]
@@ -83,7 +83,7 @@ def keep_apart(
                 wanted = gone[going[asked]]
                 wanted[np.arange(len(asked)), digit[asked]] = middle[asked]
                 posed = skins(going[asked], _WAY[place], wanted)
-                more = (skin.crossings(posed, own[asked]) > before[going[asked], own[asked]]).any(axis=1)
+                more = skin.part_crosses_more(posed, own[asked], before[going[asked], own[asked]])
                 np.logical_or.at(crosses, asked, more)
             low, high = np.where(crosses, low, middle), np.where(crosses, middle, high)
         gone[going, digit] = low

@@ -19,6 +19,7 @@ _WIDTH = 8  # children of a node of the tree
 _MARGIN = 4e-7  # margin of the boxes relative to the largest coordinate, against float32 rounding
 _MEMORY = 64_000_000  # memory for the poses of one block [bytes]
 _MOST_PARTS = 64  # bits of the masks of parts
+_UNLIMITED = np.iinfo(np.int32).max  # more crossings than there can be
 
 
 class PosedSkins:
@@ -141,24 +142,60 @@ class PosedSkins:
         wp.launch(distances_to_skin, len(points), inputs=[skins, 0, asked, limit], outputs=outs, device="cpu")
         return distance, face
 
-    def crossings(self, vertices: NDArray[np.floating], part: NDArray[np.int32] | None = None) -> NDArray[np.int64]:
+    def crossings(self, vertices: NDArray[np.floating]) -> NDArray[np.int64]:
         """Number of pairs of intersecting triangles that belong to different parts.
 
         Args:
             vertices: Deformed skins [m], shape (P, V, 3).
-            part: For each skin the one part whose crossings are counted, shape (P,); all parts if left out.
 
         Returns:
-            Counts by pair of parts, shape (P, parts, parts), symmetric; or of the chosen part with every other,
-            shape (P, parts).
+            Counts by pair of parts, shape (P, parts, parts), symmetric.
         """
-        found = [
-            self._crossings(vertices[k : k + self.most], None if part is None else part[k : k + self.most])
-            for k in range(0, len(vertices), self.most)
-        ]
+        names = len(self.parts.names)
+        found = self._crossings(vertices, np.full((len(vertices), names, names), _UNLIMITED, dtype=np.int32))
+        return np.asarray(found + found.transpose(0, 2, 1), dtype=np.int64)
+
+    def cross_more(self, vertices: NDArray[np.floating], most: NDArray[np.integer]) -> NDArray[np.bool_]:
+        """Pairs of parts with more intersecting triangles than allowed; quicker than ``crossings``.
+
+        Args:
+            vertices: Deformed skins [m], shape (P, V, 3).
+            most: Largest allowed number by pair of parts, symmetric, shape (P, parts, parts).
+
+        Returns:
+            Mask by pair of parts, symmetric, shape (P, parts, parts).
+        """
+        more = self._crossings(vertices, most) > np.triu(most, 1)
+        return np.asarray(more | more.transpose(0, 2, 1))
+
+    def part_crosses_more(
+        self, vertices: NDArray[np.floating], part: NDArray[np.integer], most: NDArray[np.integer]
+    ) -> NDArray[np.bool_]:
+        """Skins in which one part intersects any other by more triangles than allowed, shape (P,).
+
+        Args:
+            vertices: Deformed skins [m], shape (P, V, 3).
+            part: The part of each skin, shape (P,).
+            most: Largest allowed number with every other part, shape (P, parts).
+        """
+        return np.asarray((self._crossings(vertices, most, part) > most).any(axis=1))
+
+    def _crossings(
+        self, vertices: NDArray[np.floating], most: NDArray[np.integer], part: NDArray[np.integer] | None = None
+    ) -> NDArray[np.int32]:
+        """Counts of a part with every other (P, parts), or of all parts with later ones (P, parts, parts).
+
+        They end beyond ``most`` (of the same shape), in the first case with the first part for which that happens.
+        """
+        found = [np.zeros((0, *most.shape[1:]), dtype=np.int32)]
+        for first in range(0, len(vertices), self.most):
+            rows = slice(first, first + self.most)
+            found.append(self._crossings_of_block(vertices[rows], most[rows], None if part is None else part[rows]))
         return np.concatenate(found)
 
-    def _crossings(self, vertices: NDArray[np.floating], part: NDArray[np.int32] | None) -> NDArray[np.int64]:
+    def _crossings_of_block(
+        self, vertices: NDArray[np.floating], most: NDArray[np.integer], part: NDArray[np.integer] | None
+    ) -> NDArray[np.int32]:
         import warp as wp
         from warpjld_kernels.skin_crossings import count_crossings
 
@@ -166,23 +203,28 @@ class PosedSkins:
         skins = self.fitted(vertices, Places.of(vertices.mean(axis=1, dtype=np.float64)))
         bits = np.uint64(1) << np.arange(min(names, _MOST_PARTS), dtype=np.uint64)
         if part is None:
-            pose_of, part_of = (rows.ravel().astype(np.int32) for rows in np.indices((poses, names)))
+            pose_of, part_of = (rows.ravel() for rows in np.indices((poses, names)))
             later = np.array([bits[k + 1 :].sum(dtype=np.uint64) for k in range(names)], dtype=np.uint64)
             others = later[part_of]
         else:
-            pose_of, part_of = np.arange(poses, dtype=np.int32), np.asarray(part, dtype=np.int32)
+            pose_of, part_of = np.arange(poses), part
             others = bits.sum(dtype=np.uint64) - bits[part_of]
-        counts = np.zeros((len(pose_of), names), dtype=np.int32)
+        counts = np.zeros(most.shape, dtype=np.int32)
         rows = (pose_of, part_of, others, self._by_part[1], self._by_part[0])
-        kinds = (wp.int32, wp.int32, wp.uint64, wp.int32, wp.int32)
-        inputs = [wp.array(a, dtype=k, device="cpu", copy=False) for a, k in zip(rows, kinds, strict=True)]
-        out = wp.array(counts, dtype=wp.int32, device="cpu", copy=False)
-        wp.launch(count_crossings, len(pose_of), inputs=[skins, *inputs, self._scale], outputs=[out], device="cpu")
-        found = counts.astype(np.int64)
-        if part is not None:
-            return found
-        square = found.reshape(poses, names, names)
-        return np.asarray(square + square.transpose(0, 2, 1))
+        kinds = (np.int32, np.int32, np.uint64, np.int32, np.int32)
+        inputs = [wp.array(np.ascontiguousarray(a, k), device="cpu", copy=False) for a, k in zip(rows, kinds, strict=True)]
+        allowed, out = (
+            wp.array(np.ascontiguousarray(a, np.int32).reshape(-1, names), dtype=wp.int32, device="cpu", copy=False)
+            for a in (most, counts)
+        )
+        wp.launch(
+            count_crossings,
+            len(pose_of),
+            inputs=[skins, *inputs, self._scale, allowed, part is not None],
+            outputs=[out],
+            device="cpu",
+        )
+        return counts
 
     def _room(self, count: int) -> Any:
         """Arrays for at least ``count`` poses; smaller batches reuse the arrays of the largest one so far."""
