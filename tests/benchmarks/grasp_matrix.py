@@ -5,8 +5,9 @@
 
 Every case is GRASP … AUTO, then one of: ``squeeze``, SQUEEZE by 3°; ``force``, SQUEEZE FORCE 4; ``lift``, LIFT the
 object's weight. Objects are rigid, or soft (20 kPa) or stiff (1 MPa) PHYSICAL ones (``ball.soft``); what is lifted is
-PHYSICAL. Each case is a process of its own with a limit in seconds; its row is written as soon as it ends, and cases
-that have a row are left out, so that a run that was cut off goes on. The table is printed at the end, as Markdown.
+PHYSICAL. Each case is a process of its own with a limit in seconds of the processor, so that a busy machine changes no
+row; its row is written as soon as it ends, and cases that have a row are left out, so that a run that was cut off goes
+on. The table is printed at the end, as Markdown.
 
 Data of others is looked for in ``shared/data`` beside the repository; without it only built-in hands and objects run.
 
@@ -23,6 +24,8 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -65,6 +68,8 @@ COLUMNS = (
 )
 LAST = 30
 UNBALANCED = 1.0 / 3.0
+WAIT = 20.0
+"""Seconds on the wall over processor seconds after which a case counts as hung."""
 CRUSHED = 1e3
 
 
@@ -79,7 +84,7 @@ def main() -> None:
     parser.add_argument(
         "--digits", nargs="+", default=[], help="digits whose flesh is solved; the whole hand if left out"
     )
-    parser.add_argument("--limit", type=float, default=900.0, help="seconds a case may take")
+    parser.add_argument("--limit", type=float, default=900.0, help="processor seconds a case may take")
     parser.add_argument("--again", action="store_true", help="run cases again that have a row")
     parser.add_argument("--script", default="", help="lines added to every script, as FRICTION 0.3")
     parser.add_argument("--pictures", type=Path, help="folder for a picture of every case")
@@ -236,10 +241,20 @@ def apart(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> di
         arguments.pictures.mkdir(parents=True, exist_ok=True)
         command += ["--pictures", str(arguments.pictures)]
     row = dict.fromkeys(COLUMNS, "") | {"hand": hand, "object": thing, "task": task}
+    late = row | {"end": "TIMEOUT", "seconds": arguments.limit}
+    most = int(arguments.limit)
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5))
+
     try:
-        ran = subprocess.run(command, capture_output=True, text=True, timeout=arguments.limit, check=False)
+        ran = subprocess.run(
+            command, capture_output=True, text=True, timeout=WAIT * most, check=False, preexec_fn=limited
+        )
     except subprocess.TimeoutExpired:
-        return row | {"end": "TIMEOUT", "seconds": arguments.limit}
+        return late
+    if ran.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return late
     found = [line[4:] for line in ran.stdout.splitlines() if line.startswith("ROW ")]
     if found:
         return dict(json.loads(found[-1]))

@@ -87,7 +87,8 @@ def press(
         steps = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
         solution = steps.run(watch, progress)
         last = solution.last
-        for words in unresolved(body.mesh.nodes, steps.interfaces, steps.passing, last, steps.allowed(last.time)):
+        known = (body.mesh.nodes, steps.interfaces, steps.moduli, steps.passing)
+        for words in unresolved(*known, last, steps.allowed(last.time)):
             warnings.warn(words, ContactWarning, stacklevel=3)
     warn_of_rotation(body, solution.last.displacement)
     if check and not solution.converged and solution.status is not SolveStatus.STOPPED:

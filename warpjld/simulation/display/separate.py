@@ -122,6 +122,9 @@ class _MovingSurface:
         self.shown = shown
         self.at = np.array(shown.vertices, dtype=np.float64)
         self._used = np.unique(shown.faces)
+        self._facets: Facets | None = None
+        self._facets_moved = False
+        self._between_parts: Mapping[tuple[str, str], Overlap] | None = None
 
     @property
     def moved(self) -> float:
@@ -139,7 +142,12 @@ class _MovingSurface:
         tested = other._used[((x >= bottom) & (x <= top)).all(axis=1)]
         if not len(tested):
             return Overlap(tested, np.empty((0, 3)))
-        found = Facets(self.at, self.shown.faces).project(other.at[tested])
+        if self._facets is None:
+            self._facets = Facets(self.at.copy(), self.shown.faces)
+        elif self._facets_moved:
+            self._facets.move(self.at.copy())
+        self._facets_moved = False
+        found = self._facets.project(other.at[tested])
         return overlap_of(other.at, other._normals(), tested, found)[0]
 
     def inside(self, obstacle: Obstacle, time: float) -> Overlap:
@@ -149,7 +157,9 @@ class _MovingSurface:
     def part_overlaps(self) -> Mapping[tuple[str, str], Overlap]:
         """Overlaps between the parts of this surface."""
         parts = self.shown.parts
-        return {} if parts is None else self_overlaps(parts, self.at, self._normals())
+        if self._between_parts is None:
+            self._between_parts = {} if parts is None else self_overlaps(parts, self.at, self._normals())
+        return self._between_parts
 
     def separate_parts(self) -> None:
         """Move overlapping parts apart by half each, where contact resolves their overlap."""
@@ -167,6 +177,9 @@ class _MovingSurface:
 
     def move_out(self, found: Overlap, share: float) -> None:
         """Move overlapping vertices by a share of their exit vectors, limited to the largest displacement."""
+        if not len(found.vertices):
+            return
+        self._facets_moved, self._between_parts = True, None
         there = self.at[found.vertices] + share * found.exit
         start = self.shown.vertices[found.vertices]
         away = there - start

@@ -99,6 +99,8 @@ class ForceLimits:
     clearance: BoneClearance
     stops: list[Stop] = field(default_factory=list)
     _caps: dict[_Key, FlexionRamp] = field(default_factory=dict)
+    _course: dict[_Key, FlexionRamp] = field(default_factory=dict)
+    _until: dict[_Key, float] = field(default_factory=dict)
     _loads: dict[_Key, DigitLoad] = field(default_factory=dict)
     _stuck: set[_Key] = field(default_factory=set)
 
@@ -114,6 +116,7 @@ class ForceLimits:
             return solve_onward(model, history, before, times)
         reached: list[ContactInstant] = []
         now = 0.0 if before is None else before.last.time
+        self._course = dict(self._caps)
         self._check_bones(model, now, times)
         for time in self._refined(model, now, times):
             found = self._step(model, history, before, now, time)
@@ -204,6 +207,7 @@ class ForceLimits:
     ) -> ContactSolution:
         """One step, repeated with digits stopped earlier until no closing digit is above its limit."""
         self._relax(model, now, time)
+        self._course, self._until = dict(self._caps), {}
         self._spare_bones(model, now, time)
         if (inside := self.clearance.inside(self.driven(model), time)) is not None:
             raise BoneInsideError(inside)
@@ -213,7 +217,7 @@ class ForceLimits:
             if not found.converged:
                 if not closing:
                     return found
-                self._stop_loaded(model, closing, now)
+                self._stop_loaded(model, closing, now, time)
                 continue
             loads = self._loads_at(model, found)
             over = [key for key in closing if key in loads and loads[key].share(self.pressure) > 1.0]
@@ -223,7 +227,8 @@ class ForceLimits:
             for key in over:
                 was, would = self._share(key), loads[key].share(self.pressure)
                 part = (_AIM - was) / (would - was) if was < _AIM and tried < _TRIES else 0.0
-                self._stop(model, key, now + part * (time - now), loads[key].bound(self.pressure))
+                moved = self._until.get(key, time) - now  # it may have stopped within the step already
+                self._stop(model, key, now, time, now + part * moved, loads[key].bound(self.pressure))
         raise AssertionError
 
     def _spare_bones(self, model: ContactModel, now: float, time: float) -> None:
@@ -239,13 +244,13 @@ class ForceLimits:
                     if any(_key_of(closing, one) == key and one.left < _SPENT for one in tight):
                         break
                     at = moment
-                self._stop(model, key, at, "hardly any flesh is left before its bone")
+                self._stop(model, key, now, time, at, "hardly any flesh is left before its bone")
 
-    def _stop_loaded(self, model: ContactModel, closing: Sequence[_Key], now: float) -> None:
+    def _stop_loaded(self, model: ContactModel, closing: Sequence[_Key], now: float, time: float) -> None:
         """Stop the closing digits that bear a load, or all closing ones if none does."""
         pressing = [key for key in closing if self._share(key) > 0.0]
         for key in pressing or closing:
-            self._stop(model, key, now, "no equilibrium was found beyond")
+            self._stop(model, key, now, time, now, "no equilibrium was found beyond")
             self._stuck.add(key)
 
     def _share(self, key: _Key) -> float:
@@ -261,28 +266,35 @@ class ForceLimits:
             out |= {(hand.name, digit): load for digit, load in loads.items()}
         return out
 
-    def _angles(self, hand: FleshBody, time: float) -> NDArray[np.float64]:
-        """Limited joint angles of a hand [rad], shape (J, 4)."""
-        caps = (ramp for (actor, _), ramp in self._caps.items() if actor == hand.name)
-        return held_angles(hand.bones.angles(time), caps, time)
+    def _angles(
+        self, hand: FleshBody, time: float, caps: Mapping[_Key, FlexionRamp] | None = None
+    ) -> NDArray[np.float64]:
+        """Joint angles of a hand, limited by the current ramps or by given ones [rad], shape (J, 4)."""
+        ramps = (self._caps if caps is None else caps).items()
+        return held_angles(hand.bones.angles(time), (ramp for (actor, _), ramp in ramps if actor == hand.name), time)
 
     def _closing(self, model: ContactModel, now: float, time: float) -> list[_Key]:
         """Digits with a joint whose flexion increases in a step."""
         out = []
         for hand in _bendable(model):
-            change = (self._angles(hand, time) - self._angles(hand, now))[:, FLEXION]
+            change = (self._angles(hand, time) - self._angles(hand, now, self._course))[:, FLEXION]
             digits = closing_joints(hand.bones.skeleton).items()
             out += [(hand.name, digit) for digit, joints in digits if (change[joints] > _SAME).any()]
         return out
 
-    def _stop(self, model: ContactModel, key: _Key, time: float, why: str) -> None:
-        """Limit a digit's flexions to those at a time from there on."""
+    def _stop(self, model: ContactModel, key: _Key, now: float, time: float, at: float, why: str) -> None:
+        """Limit a digit's flexions in a step ``now`` … ``time`` to those that its course in the step has at ``at``.
+
+        The course is that without stops in this step: a digit that lags behind the animation has smaller flexions at
+        ``now`` than at ``at``.
+        """
         hand = next(one for one in model.hands if one.name == key[0])
-        angles = self._angles(hand, time)
+        begin, end = (self._angles(hand, moment, self._course)[:, FLEXION] for moment in (now, at))
         joints = closing_joints(hand.bones.skeleton)[key[1]]
-        self._caps[key] = FlexionRamp(time, time, {joint: (float(angles[joint, FLEXION]),) * 2 for joint in joints})
+        ends = {joint: (float(begin[joint]), float(end[joint])) for joint in joints}
+        self._caps[key], self._until[key] = FlexionRamp(now, time, ends), at
         if not any((one.actor, one.digit) == key for one in self.stops):
-            self.stops.append(Stop(*key, model.start + time, why))
+            self.stops.append(Stop(*key, model.start + at, why))
 
     def _relax(self, model: ContactModel, now: float, time: float) -> None:
         """Raise the limits of stopped digits whose load has dropped, so far that flesh is compressed little in a step.

@@ -202,9 +202,9 @@ class Facets:
 
 def _neighbours(faces: Ints32) -> Ints:
     """Triangle across the edge opposite each corner, −1 at boundary and non-manifold edges, shape (t, 3)."""
-    edges = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    _, label, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    label = label.ravel()
+    edges = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2).astype(np.int64)
+    key = edges.min(axis=1) * (edges.max() + 1) + edges.max(axis=1)
+    _, label, uses = np.unique(key, return_inverse=True, return_counts=True)
     order = np.argsort(label, kind="stable")
     out = np.full(len(label), -1, dtype=np.int64)
     first = np.concatenate([[0], np.cumsum(uses)[:-1]])[uses == 2]
