@@ -19,6 +19,7 @@ from warpjld.files.nesting import nesting
 from warpjld.geometry.lengths import LARGEST, SMALLEST, check_size
 from warpjld.io import load_rig
 from warpjld.limits import LIMITS, check_limit, limit, set_limit, variable
+from warpjld.motion.hand_file import read_hands
 from warpjld.script import Interpreter, Scene
 from warpjld.study.grasping import load_plan
 
@@ -150,3 +151,10 @@ def test_huge_and_tiny_numbers_in_scripts(tmp_path: Path, line: str) -> None:
     scene.add("A", finger())
     with pytest.raises(InputError):
         Interpreter(scene).run_text(line)
+
+
+def test_recordings_as_json_are_limited_by_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WARPJLD_LIMIT_JSON_BYTES", "20")
+    (tmp_path / "hand.json").write_text('{"frames": [[1, 2, 3]]}')
+    with pytest.raises(InputError, match=r"hand\.json: JSON .*as \.npz or \.bvh\): 23 bytes; the limit is 20 "):
+        read_hands(tmp_path / "hand.json")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import io
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
@@ -59,8 +60,12 @@ def read_json(path: str | Path) -> Any:
     """Content of a JSON file; integers beyond 64 bits are read as floats, infinite if out of their range.
 
     Raises:
-        InputError: The file cannot be read, or is not JSON; names line and column.
+        InputError: The file cannot be read, or is not JSON; names line and column. Or it exceeds ``json-bytes``, since
+            as Python objects it takes several times as much memory.
     """
+    with open_input(path) as file:
+        size = os.fstat(file.fileno()).st_size
+    check_limit("json-bytes", size, of="JSON (motions of many frames: as .npz or .bvh)", path=path)
     return parse_json(read_text(path), path)
 
 

@@ -21,9 +21,8 @@ from typing import Any
 from warpjld.errors import InputError
 from warpjld.limits import limit, variable
 from warpjld.runtime.separate_process import LATE, running_process
-from warpjld.runtime.separate_program import too_much
 
-__all__ = ["Answer", "separately"]
+__all__ = ["Answer", "separately", "too_late", "too_much"]
 
 _TRIES = 2  # a process may end, being idle, just when it is asked
 _lock = threading.RLock()
@@ -77,17 +76,35 @@ def _answer(request: str, path: Path, kind: str, memory: int) -> Answer:
         line = process.asked(request, seconds)
         if line.endswith("\n"):
             told = json.loads(line)
+            if "memory" in told:
+                raise too_much(kind, memory, path)
             if "refused" in told:
                 raise _refusal(told["refused"], path)
             return Answer(told["value"], process.folder)
         code = process.end()
         if line == LATE:
-            why = f"not done after {seconds} s (raise it by warpjld --limit reader-seconds=… or "
-            raise InputError(f"cannot be read as {kind}: {why}{variable('reader-seconds')})", path=path)
+            raise too_late(kind, seconds, path)
         if code:
             break
-    why = f"the process that reads it ends with code {code}: the file is damaged, or "
-    raise InputError(too_much(kind, memory, why).message, path=path)
+    raise too_much(kind, memory, path, f"the process that reads it ends with code {code}: the file is damaged, or ")
+
+
+def too_late(kind: str, seconds: int, path: Path) -> InputError:
+    """Error of a file that is not read in time [s]."""
+    return InputError(
+        f"cannot be read as {kind}: not done after {seconds} s (raise it by warpjld --limit reader-seconds=… or "
+        f"{variable('reader-seconds')})",
+        path=path,
+    )
+
+
+def too_much(kind: str, memory: int, path: Path, why: str = "") -> InputError:
+    """Error of a file whose reading needs more memory than it may [bytes]."""
+    return InputError(
+        f"cannot be read as {kind}: {why}it needs more than {memory:,} bytes of memory (raise it by warpjld --limit "
+        f"reader-bytes=… or {variable('reader-bytes')})",
+        path=path,
+    )
 
 
 def _refusal(told: dict[str, Any], path: Path) -> InputError:

@@ -42,6 +42,11 @@ class _Process:
             env=os.environ | _ONE_THREAD,
         )
 
+    @property
+    def pid(self) -> int:
+        """Its number."""
+        return self._popen.pid
+
     def usable(self) -> bool:
         """Whether it runs, and is this process's own: a fork must not use its parent's."""
         return self._owner == os.getpid() and self._popen.poll() is None and self.folder.is_dir()

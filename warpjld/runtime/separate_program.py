@@ -20,7 +20,7 @@ from warpjld.files.reading import reading
 from warpjld.limits import variable
 from warpjld.runtime.lazily import imported
 
-__all__ = ["serve", "too_much"]
+__all__ = ["serve"]
 
 _IDLE = 20.0  # time without a request after which the process ends [s]
 _BASE = 1 << 30  # address space of the interpreter and its libraries where it cannot be measured [bytes]
@@ -67,17 +67,9 @@ def _answered(request: dict[str, Any], folder: Path) -> tuple[dict[str, Any], bo
         return _refused(error), not isinstance(error.__cause__, RuntimeError)
     except MemoryError:
         _bound_memory(None)
-        return _refused(too_much(request["kind"], request["memory"])), False
+        return {"memory": True}, False
     finally:
         _bound_memory(None)
-
-
-def too_much(kind: str, memory: int, why: str = "") -> InputError:
-    """Error of a file whose reading needs more memory than it may [bytes]."""
-    return InputError(
-        f"cannot be read as {kind}: {why}it needs more than {memory:,} bytes of memory (raise it by warpjld --limit "
-        f"reader-bytes=… or {variable('reader-bytes')})"
-    )
 
 
 def _refused(error: InputError) -> dict[str, Any]:

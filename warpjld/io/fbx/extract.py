@@ -1,12 +1,12 @@
-"""Program that converts an FBX file's content to an NPZ file: ``extract.py FILE OUT.npz ANIMATED NAME RATE``.
+"""Program that converts an FBX file's content to an NPZ file: ``extract.py FILE OUT.npz ANIMATED NAME RATE MEMORY``.
 
 It runs in a process of its own, imports nothing of this package, and exits without cleaning up, because ufbx's Python
 binding (0.0.5) has a reference counting error: it keeps each element of a scene in a table and returns the table's own
 reference, so that garbage collection frees elements twice. Here each element gets an additional reference, nothing is
-ever freed, and a crash on a broken file ends this process only. Memory is limited, too.
+ever freed, and a crash on a broken file ends this process only. Its memory is limited to MEMORY bytes of addresses.
 
 Everything is in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be
-used, 4 that ufbx cannot be imported.
+used, 4 that ufbx cannot be imported, 5 that memory does not suffice.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def load(path: str) -> Any:
     except (ufbx.UfbxError, RuntimeError, ValueError) as error:
         fail(error)
     except MemoryError:
-        fail("needs more memory than a file of its size should")
+        os._exit(5)
 
 
 def bind_poses(scene: Any) -> dict[int, Array]:
@@ -202,9 +202,9 @@ def sample(scene: Any, stack: int, times: Array, out: str) -> None:
             file.write(world.tobytes())
 
 
-def main(path: str, out: str, animated: str, name: str, rate: str) -> None:
+def main(path: str, out: str, animated: str, name: str, rate: str, memory: str) -> None:
     gc.disable()  # it would free elements in use
-    bound_memory(os.path.getsize(path))
+    bound_memory(int(memory))
     scene = load(path)
     KEPT.append(scene)
     nodes = elements(scene.nodes)
@@ -277,12 +277,11 @@ def choose(several: list[dict[str, Any]], name: str) -> int | None:
     return None
 
 
-def bound_memory(size: int) -> None:
+def bound_memory(limit: int) -> None:
     try:
         import resource
     except ImportError:  # not available on Windows
         return
-    limit = 4 * 2**30 + 200 * size
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     if hard == resource.RLIM_INFINITY or hard > limit:
         resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
@@ -292,6 +291,6 @@ if __name__ == "__main__":
     try:
         main(*sys.argv[1:])
     except MemoryError:
-        fail("needs more memory than a file of its size should")
+        os._exit(5)
     sys.stdout.flush()
     os._exit(0)  # without cleaning up, see the module's docstring

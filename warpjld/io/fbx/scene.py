@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.files.spilled_rows import SpilledRows
+from warpjld.limits import limit
+from warpjld.runtime.separate import too_late, too_much
 
 __all__ = ["FbxMesh", "FbxScene", "FbxSkin", "FbxStack", "read_scene"]
 
 _FURTHEST = 1e12  # largest plausible coordinate in the file's units
-_LONGEST = 600.0
-"""Time limit of reading [s]."""
-_NO_LIBRARY = 4
-"""Exit code of the reading program if ufbx cannot be imported."""
+_PER_BYTE = 200
+"""Memory for each byte of a file: its elements are Python objects, which are never freed."""
+_NO_LIBRARY, _NO_MEMORY = 4, 5
+"""Exit codes of the reading program if ufbx cannot be imported, and if memory does not suffice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,21 +181,24 @@ def _extract(
     program = Path(__file__).with_name("extract.py")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
-        arguments = [str(path.absolute()), str(out), "yes" if animated else "no", name, str(float(rate))]
+        memory, seconds = limit("reader-bytes") + _PER_BYTE * path.stat().st_size, limit("reader-seconds")
+        how = ["yes" if animated else "no", name, str(float(rate)), str(memory)]
         try:
             done = subprocess.run(
-                [sys.executable, "-P", str(program), *arguments],
+                [sys.executable, "-P", str(program), str(path.absolute()), str(out), *how],
                 capture_output=True,
                 text=True,
                 errors="replace",
-                timeout=_LONGEST,
+                timeout=seconds,
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise InputError(f"cannot be read as FBX: not done after {_LONGEST:.0f} s", path=path) from None
+            raise too_late("FBX", seconds, path) from None
         last = done.stderr.strip().splitlines()[-1:] or [""]
         if done.returncode == _NO_LIBRARY:
             raise MissingExtraError("FBX", "fbx")
+        if done.returncode == _NO_MEMORY:
+            raise too_much("FBX", memory, path)
         if done.returncode:
             why = last[0] if done.returncode > 0 and last[0] else f"the reader ends with code {done.returncode}"
             raise InputError(f"cannot be read as FBX: {why}", path=path)
