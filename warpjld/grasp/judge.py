@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +14,10 @@ from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.objects import GraspObject
-from warpjld.grasp.quality.closure import force_closure
-from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.quality.closure import closure_margins
+from warpjld.grasp.quality.contacts import Contacts, patch_spin
 from warpjld.grasp.quality.touch import ContactPatches
-from warpjld.grasp.quality.wrench_space import least_resistance
+from warpjld.grasp.quality.wrench_space import least_resistance, least_resistances
 from warpjld.grasp.segments import SEGMENTS, vertex_segments
 from warpjld.grasp.subdivided_skin import FinerSkin
 from warpjld.grasp.touching import touching_patches
@@ -30,6 +29,7 @@ _TOUCH = 5e-4  # largest distance that counts as contact [m]
 _NEARLY = 2.5e-3  # the same when ranking hands that closed roughly [m]
 _SPACING = 1.5e-3  # spacing of the sample points on the skin [m]
 _EDGES = 8  # edges of the friction cones
+_NOTHING = Contacts(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 _DIGIT = 0.01  # bonus to the score for every digit in contact [N]
 
 
@@ -117,15 +117,14 @@ class Judge:
         −1 without two digits and either thumb or palm; else closure margin + 0.04 per digit + 0.1 if force closed
         − 50 per metre of depth beyond 1 mm. The weights are chosen by hand.
         """
-        ranks = np.zeros(len(vertices))
-        for g, (patches, depth) in enumerate(self._patches(self._skin, vertices, _NEARLY)):
-            contacts, digits, palm = self._pressing(patches, poses.rotations[g])
-            deep = max(0.0, depth - 1e-3)
-            if ("thumb" not in digits and not palm) or len(digits) < 2:
-                ranks[g] = -1.0
-                continue
-            closure = force_closure(contacts, self._center, torque_scale=self._radius, edges=6)
-            ranks[g] = closure.margin + 0.04 * len(digits) + 0.1 * closure.closed - 50.0 * deep
+        hands = self._pressing(poses, *self._patches(self._skin, vertices, _NEARLY))
+        ranks = np.full(len(hands), -1.0)
+        kept = [g for g, hand in enumerate(hands) if ("thumb" in hand.digits or hand.palm) and len(hand.digits) > 1]
+        of_kept = [hands[g].contacts for g in kept]
+        margins = closure_margins(of_kept, self._center, torque_scale=self._radius, edges=6)
+        for g, margin in zip(kept, margins.tolist(), strict=True):
+            deep = max(0.0, hands[g].depth - 1e-3)
+            ranks[g] = margin + 0.04 * len(hands[g].digits) + 0.1 * (margin > 0.0) - 50.0 * deep
         return ranks
 
     def judge(self, poses: Poses, vertices: NDArray[np.floating], depths: NDArray[np.float64]) -> list[Verdict]:
@@ -136,17 +135,17 @@ class Judge:
             vertices: Their deformed skins [m], shape (G, V, 3).
             depths: Penetration depths of hands and object [m], see ``HandObjectGaps``, shape (G,).
         """
+        hands = self.pressing(poses, vertices)
+        how = {"torque_scale": self._radius, "edges": _EDGES}
+        epsilons = least_resistances([hand.contacts for hand in hands], self._center, **how)
         return [
-            self.verdict(hand.contacts, hand.digits, hand.palm, max(float(depth), hand.depth))
-            for hand, depth in zip(self.pressing(poses, vertices), depths, strict=True)
+            Verdict(epsilon > 0.0, epsilon, hand.digits, hand.palm, max(float(depth), hand.depth))
+            for hand, epsilon, depth in zip(hands, epsilons, depths, strict=True)
         ]
 
     def pressing(self, poses: Poses, vertices: NDArray[np.floating]) -> list[Pressing]:
         """Contacts that can press, of G closed hands with skins (G, V, 3) [m]."""
-        return [
-            Pressing(*self._pressing(patches, poses.rotations[g]), depth)
-            for g, (patches, depth) in enumerate(self._patches(self._finer, vertices, _TOUCH))
-        ]
+        return self._pressing(poses, *self._patches(self._finer, vertices, _TOUCH))
 
     def verdict(self, contacts: Contacts, digits: tuple[str, ...], palm: bool, depth: float) -> Verdict:
         """Judge contacts in the object's frame; they are force closed where epsilon is above 0."""
@@ -155,25 +154,38 @@ class Judge:
 
     def _patches(
         self, finer: FinerSkin, vertices: NDArray[np.floating], tolerance: float
-    ) -> Iterable[tuple[ContactPatches, float]]:
+    ) -> tuple[list[ContactPatches], NDArray[np.float64]]:
         """Contact patches in the object's frame and depth of the skin's deepest point [m], for every hand."""
         place, parts = self.both.thing.place, self._segments[finer.parents]
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
-        patches, depths = touching_patches(finer, parts, self.both.near, local, tolerance)
-        return zip(patches, depths.tolist(), strict=True)
+        return touching_patches(finer, parts, self.both.near, local, tolerance)
 
     def _pressing(
-        self, patches: ContactPatches, rotations: NDArray[np.float64]
-    ) -> tuple[Contacts, tuple[str, ...], bool]:
-        rows = [SEGMENTS.index(name) for name in patches.names]
+        self, poses: Poses, patches: list[ContactPatches], depths: NDArray[np.float64]
+    ) -> list[Pressing]:
+        """What presses of the patches of every hand."""
+        names = [name for own in patches for name in own.names]
+        if not names:
+            return [Pressing(_NOTHING, (), False, float(depth)) for depth in depths]
+        rows = np.array([SEGMENTS.index(name) for name in names])
+        hand = np.repeat(np.arange(len(patches)), [len(own) for own in patches])
+        points, normals, facing, areas = (
+            np.concatenate([getattr(own, what) for own in patches])
+            for what in ("points", "normals", "skin_normals", "areas")
+        )
         own = Rotation.from_quat(self.both.thing.place.rotation[0]).inv()
-        turns = own * Rotation.from_quat(rotations[self._joints[rows]]) if rows else None
-        inner = turns.apply(self._inner[rows]) if turns is not None else np.zeros((0, 3))
-        kept = np.flatnonzero((inner * patches.skin_normals).sum(axis=1) > 0.0)
-        spin = patches.contacts(self.friction).spin
-        contacts = Contacts(patches.points[kept], patches.normals[kept], np.array(self.friction), spin[kept])
-        names = [patches.digits[k] for k in kept]
-        return contacts, tuple(dict.fromkeys(n for n in names if n != "palm")), "palm" in names
+        turns = own * Rotation.from_quat(poses.rotations[hand, self._joints[rows]])
+        kept = (turns.apply(self._inner[rows]) * facing).sum(axis=1) > 0.0
+        contacts = Contacts(points, normals, np.array(self.friction), patch_spin(self.friction, areas))
+        digits = [name.partition(".")[0] for name in names]
+        ends = np.searchsorted(hand, np.arange(len(patches) + 1))
+        out = []
+        for first, end, depth in zip(ends[:-1], ends[1:], depths.tolist(), strict=True):
+            its = first + np.flatnonzero(kept[first:end])
+            pressing = [digits[k] for k in its]
+            fingers = tuple(dict.fromkeys(name for name in pressing if name != "palm"))
+            out.append(Pressing(contacts[its], fingers, "palm" in pressing, depth))
+        return out
 
 
 def judge(

@@ -136,8 +136,7 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
     channels = angles[frame[:, None], j]
     mirror = skeleton.mirror[j]
     direction, axis = skeleton.directions[j], skeleton.axes[j]
-    normal = np.cross(direction, axis)
-    before = _about(normal, mirror * channels[..., CHANNELS.index("abduction")])
+    before = _about(skeleton.normals[j], mirror * channels[..., CHANNELS.index("abduction")])
     if skeleton.initial_turns is not None:  # turns count from rest
         before = multiply(conjugate(skeleton.initial_turns[j]), before)
     bend = _turn(_about(direction, mirror * channels[..., CHANNELS.index("pivot")]), axis)

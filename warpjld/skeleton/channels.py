@@ -22,6 +22,7 @@ def channel_rotations(
     axes: NDArray[np.float64],
     directions: NDArray[np.float64],
     mirror: NDArray[np.float64],
+    normals: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Rotations of K bones from their joints' angles, quaternions x, y, z, w in the axes of ``directions``, (…, K, 4).
 
@@ -30,8 +31,9 @@ def channel_rotations(
         axes: Unit flexion axes, shape (K, 3).
         directions: Unit directions of the bones, shape (K, 3).
         mirror: -1 for the left side, else 1, shape (K, 1).
+        normals: directions × axes, shape (K, 3); computed if left out.
     """
-    normals = np.cross(directions, axes)
+    normals = np.cross(directions, axes) if normals is None else normals
     flexion, pivot, twisting, abduction = (angles[..., k, None] for k in range(len(CHANNELS)))
     pivoted = rotate(about(mirror * pivot * directions), axes)
     local = multiply(about(mirror * abduction * normals), about(flexion * pivoted))

@@ -113,7 +113,7 @@ def joint_rotations(
     """
     chosen = slice(None) if joints is None else joints
     axes, directions, mirror = skeleton.axes[chosen], skeleton.directions[chosen], skeleton.mirror[chosen, None]
-    turned = channel_rotations(angles, axes, directions, mirror)
+    turned = channel_rotations(angles, axes, directions, mirror, skeleton.normals[chosen])
     if skeleton.initial_turns is None:
         return turned
     return np.asarray(multiply(conjugate(skeleton.initial_turns[chosen]), turned))
@@ -189,7 +189,7 @@ def _compose(
     local = local * np.where(local[..., 3:] < 0.0, -1.0, 1.0)
     rotations = np.empty((frames, count, 4))
     positions = np.empty((frames, count, 3))
-    for joints, parents in _levels(skeleton.parents):
+    for joints, parents in skeleton.levels:
         if parents[0] < 0:
             turn = local[:, joints] if root_rotation is None else multiply(root_rotation[:, None], local[:, joints])
             rotations[:, joints] = turn
@@ -209,20 +209,7 @@ def vertical_flexion(skeleton: Skeleton, local: NDArray[np.float64]) -> NDArray[
         skeleton: The rest skeleton.
         local: Joint rotations relative to the parent's bone, quaternions x, y, z, w, shape (F, J, 4).
     """
-    straight, axes = skeleton.straight
-    initial = straight - axes * (axes * straight).sum(axis=1, keepdims=True)
-    length = np.linalg.norm(initial, axis=1, keepdims=True)
-    bends = length[:, 0] >= 1e-6  # elsewhere the axis lies along the segment
-    initial = initial / np.where(length >= 1e-6, length, 1.0)
+    initial, level, bends = skeleton.bending_planes
     moved = rotate(local, skeleton.directions)
-    angle = np.arctan2((moved * np.cross(axes, initial)).sum(axis=-1), (moved * initial).sum(axis=-1))
+    angle = np.arctan2((moved * level).sum(axis=-1), (moved * initial).sum(axis=-1))
     return np.asarray(np.where(bends, angle, 0.0))
-
-
-def _levels(parents: NDArray[np.int32]) -> list[tuple[NDArray[np.int64], NDArray[np.int32]]]:
-    """Joints and their parents, grouped by depth in the tree (roots first): each level is computed at once."""
-    depth = np.zeros(len(parents), dtype=np.int64)
-    for j, parent in enumerate(parents.tolist()):
-        depth[j] = depth[parent] + 1 if parent >= 0 else 0
-    levels = (np.flatnonzero(depth == d) for d in range(int(depth.max(initial=-1)) + 1))
-    return [(joints, parents[joints]) for joints in levels]

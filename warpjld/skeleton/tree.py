@@ -173,6 +173,35 @@ class Skeleton:
         back = conjugate(self.initial_turns)
         return rotate(back, self.directions), rotate(back, self.axes)
 
+    @cached_property
+    def levels(self) -> tuple[tuple[NDArray[np.int64], NDArray[np.int32]], ...]:
+        """Joints and their parents by depth in the tree, roots first: all of a level can be computed at once."""
+        depth = np.zeros(len(self), dtype=np.int64)
+        for j, parent in enumerate(self.parents.tolist()):
+            depth[j] = depth[parent] + 1 if parent >= 0 else 0
+        levels = (np.flatnonzero(depth == d) for d in range(int(depth.max(initial=-1)) + 1))
+        return tuple((joints, self.parents[joints]) for joints in levels)
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Segment × flexion axis, which points to the external side, shape (J, 3) (R20)."""
+        return np.cross(self.directions, self.axes)
+
+    @cached_property
+    def bending_planes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Plane in which the vertical flexion of every joint is measured (R28).
+
+        Returns:
+            Straight direction in the plane normal to the unpivoted axis, and the direction of flexion from there, unit
+            vectors, shapes (J, 3); mask of the joints that have such a plane, shape (J,).
+        """
+        straight, axes = self.straight
+        initial = straight - axes * (axes * straight).sum(axis=1, keepdims=True)
+        length = np.linalg.norm(initial, axis=1, keepdims=True)
+        bends = length[:, 0] >= 1e-6  # elsewhere the axis lies along the segment
+        initial = initial / np.where(length >= 1e-6, length, 1.0)
+        return initial, np.cross(axes, initial), bends
+
     def with_axes(self, axes: NDArray[np.float64]) -> Skeleton:
         """The same skeleton with other flexion axes (R21)."""
         return replace(self, axes=unit(axes))

@@ -37,15 +37,15 @@ def friction_cone(contacts: Contacts, edges: int = 8) -> list[NDArray[np.float64
     if edges < 3:
         raise InputError(f"edges: a friction cone needs 3 or more, got {edges}")
     angles = 2.0 * np.pi * np.arange(edges) / edges
+    ring = np.stack([np.cos(angles), np.sin(angles), np.ones(edges), np.zeros(edges)])
     cones = []
-    for friction, spin in zip(contacts.friction, contacts.spin, strict=True):
-        ring = angles if friction > 0.0 else np.zeros(0)
-        columns = [
-            np.stack([friction * np.cos(ring), friction * np.sin(ring), np.ones_like(ring), np.zeros_like(ring)])
-        ]
+    for friction, spin in zip(contacts.friction.tolist(), contacts.spin.tolist(), strict=True):
+        columns = []
+        if friction > 0.0:
+            columns.append(ring * [[friction], [friction], [1.0], [1.0]])
         if spin > 0.0:
             columns.append(np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 1.0], [spin, -spin]]))
         elif friction == 0.0:
             columns.append(np.array([[0.0], [0.0], [1.0], [0.0]]))
-        cones.append(np.concatenate(columns, axis=1))
+        cones.append(np.concatenate(columns, axis=1) if len(columns) > 1 else columns[0])
     return cones

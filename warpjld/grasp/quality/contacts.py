@@ -59,6 +59,14 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.points)
 
+    def __getitem__(self, rows: NDArray[np.integer]) -> Contacts:
+        """Some of the contacts, as they are."""
+        out = object.__new__(Contacts)  # these arrays have been checked and normalised
+        for name in ("points", "normals", "friction", "spin", "tangents", "areas"):
+            object.__setattr__(out, name, getattr(self, name)[rows])
+        object.__setattr__(out, "digits", tuple(self.digits[k] for k in rows))
+        return out
+
     @property
     def frames(self) -> Array:
         """Contact frames as columns: first tangent, second tangent, normal; right-handed, shape (C, 3, 3)."""

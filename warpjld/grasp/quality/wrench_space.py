@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING, Literal
@@ -11,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.quality.nearest_facet import distances_to_boundary
 from warpjld.grasp.quality.wrenches import contact_wrenches, has_full_rank
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-__all__ = ["WrenchSpace", "least_resistance", "wrench_space"]
+__all__ = ["WrenchSpace", "least_resistance", "least_resistances", "wrench_space"]
 
 Array = NDArray[np.float64]
 
@@ -97,24 +99,39 @@ def wrench_space(
 def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: float, edges: int = 8) -> float:
     """Epsilon [N] of ``wrench_space`` for norm "L1", without the volume and therefore faster; 0 without force closure.
 
-    An incremental hull: starting from a few wrenches, the farthest wrench beyond each of the nearest facets is added,
-    until none lies beyond the nearest facet, which is then a facet of the full hull.
-
     Args:
         contacts: C contacts.
         center: Point torques are taken about [m].
         torque_scale: Length ρ that torques are divided by [m].
         edges: Edges of a friction cone.
     """
-    blocks = contact_wrenches(contacts, center, torque_scale, edges)
-    if not blocks or not has_full_rank(np.concatenate(blocks, axis=1)):
-        return 0.0
-    points = _union(blocks)
+    return least_resistances([contacts], center, torque_scale=torque_scale, edges=edges)[0]
+
+
+def least_resistances(
+    grasps: Sequence[Contacts], center: ArrayLike, *, torque_scale: float, edges: int = 8
+) -> list[float]:
+    """``least_resistance`` of many grasps of one object [N]."""
+    blocks = [contact_wrenches(contacts, center, torque_scale, edges) for contacts in grasps]
+    spanning = [k for k, own in enumerate(blocks) if own and has_full_rank(np.concatenate(own, axis=1))]
+    points = [_union(blocks[k]) for k in spanning]
+    out = [0.0] * len(grasps)
+    for k, own, found in zip(spanning, points, distances_to_boundary(points), strict=True):
+        epsilon = _by_growing_hull(own) if found is None else found
+        out[k] = epsilon if epsilon > 10.0 * _SHAKE else 0.0
+    return out
+
+
+def _by_growing_hull(points: Array) -> float:
+    """Distance from the origin to the boundary of the hull of points (k, 6) by qhull.
+
+    Starting from a few points, the farthest point beyond each of the nearest facets is added, until none lies beyond
+    the nearest facet, which is then a facet of the full hull.
+    """
     beyond = _GROWN * float(np.abs(points).max())
     inside = np.zeros(len(points), dtype=bool)
     inside[0] = True
     inside[_independent(points)] = True
-    epsilon = 0.0
     while True:
         equations = _hull(points[inside]).equations
         nearest = np.argsort(-equations[:, -1], kind="stable")[:_TOGETHER]
@@ -124,10 +141,8 @@ def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: flo
         out = heights[np.arange(len(nearest)), farthest] + offsets > beyond
         added = farthest[out & ~inside[farthest]]
         if not out[0] or not len(added):
-            epsilon = -float(offsets[0])
-            break
+            return -float(offsets[0])
         inside[added] = True
-    return epsilon if epsilon > 10.0 * _SHAKE else 0.0
 
 
 def _independent(points: Array) -> NDArray[np.integer]:
