@@ -108,6 +108,7 @@ def test_targets_for_people(hand: Path, shapes: Path, tmp_path: Path) -> None:
         (["builtin:left", "--targets", "none.npz"], "cannot be read"),
     ],
 )
+@pytest.mark.usefixtures("quick_hands")
 def test_bad_input(arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=message):

@@ -191,6 +191,7 @@ def test_a_load_that_makes_a_block_give_way_is_named() -> None:
         [pair],
         Loads(traction={"z+": (0.0, 0.0, -0.4)}),
         times=(0.4, 1.0),
+        halvings=0,
         check=False,
     )
     assert found.status in {SolveStatus.INDEFINITE, SolveStatus.SLIDING}
