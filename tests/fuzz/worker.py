@@ -72,7 +72,7 @@ def forked(name: str, start: int, seconds: float, folder: Path) -> tuple[int, li
 def _try_many(name: str, start: int, seconds: float, folder: Path, tell: Callable[[dict[str, object]], None]) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
-    os.environ["WARPJLD_LIMIT_READER_SECONDS"] = str(SECONDS)
+    os.environ["WARPJLD_LIMIT_READER_SECONDS"] = str(_WAIT)
     path = sound(name, folder)
     data = path.read_bytes()
     KINDS[name][1](path)  # imports and kernels: no input's fault

@@ -19,6 +19,7 @@ from warpjld.geometry.normals import vertex_normals
 from warpjld.geometry.spread import spread
 from warpjld.rig import Skin
 from warpjld.runtime.lazily import lazy_module
+from warpjld.runtime.query_mesh import query_mesh
 from warpjld.runtime.threads import in_threads, threads_for
 from warpjld.skeleton.tree import Skeleton
 
@@ -182,7 +183,7 @@ def _nearest_visible(
 
     device = "cpu"
     places = wp.array(points.astype(np.float32), dtype=wp.vec3, device=device)
-    mesh = wp.Mesh(places, wp.array(faces.ravel(), dtype=wp.int32, device=device))
+    mesh = query_mesh(places, faces)
     tips = [wp.array(lines[:, k].astype(np.float32), dtype=wp.vec3, device=device) for k in (0, 1)]
     normals = wp.array(vertex_normals(points, faces), dtype=wp.vec3, device=device)
     nearest = wp.empty(len(points), dtype=wp.int32, device=device)

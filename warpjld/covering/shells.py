@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from warpjld.geometry.normals import vertex_normals
 from warpjld.geometry.rotations import unit
+from warpjld.runtime.query_mesh import query_mesh
 
 __all__ = ["Shells", "shell_numbers", "shells"]
 
@@ -300,11 +301,8 @@ def _nearest(
 def _mesh(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[Any, NDArray[np.float64]]:
     """A Warp mesh for queries, relative to the mean of its vertices (float32 loses digits far from the origin), and
     that mean [m]."""
-    import warp as wp
-
     centre = vertices[faces.ravel()].mean(axis=0)
-    points = wp.array((vertices - centre).astype(np.float32), dtype=wp.vec3, device="cpu")
-    return wp.Mesh(points, wp.array(faces.astype(np.int32).ravel(), dtype=wp.int32, device="cpu")), centre
+    return query_mesh(vertices - centre, faces), centre
 
 
 def _line_distance(points: NDArray[np.float64], lines: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.geometry.coincident import close_pairs, connected_parts
+from warpjld.geometry.lengths import check_reach
 
 __all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
 
+_NO_AREA = 1e-12  # of a triangle, per square of the surface's size: what double precision makes of a line
 _SEAM = 1e-6  # relative to the surface's size: border vertices of two parts nearer than this coincide (float32 files)
 
 
@@ -160,7 +162,7 @@ def weld_surface(
         tolerance: Distance below which two vertices are welded, relative to the diagonal of the faces' bounding box.
 
     Raises:
-        InputError: Wrong shapes, not finite, no faces, or an index out of range.
+        InputError: Wrong shapes, not finite, no faces with three different corners, or an index out of range.
     """
     points = np.asarray(vertices, dtype=np.float64)
     triangles = np.asarray(faces, dtype=np.int64)
@@ -170,6 +172,7 @@ def weld_surface(
         raise InputError(f"faces: want shape (n, 3) with n > 0, got {triangles.shape}")
     if not np.isfinite(points).all():
         raise InputError(f"vertices: vertex {int(np.argwhere(~np.isfinite(points))[0][0])} is not finite")
+    check_reach(points, "vertices")
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise InputError(f"faces: indices must lie in 0…{len(points) - 1}, got {triangles.min()}…{triangles.max()}")
     if not parts:
@@ -189,6 +192,8 @@ def weld_surface(
     kept, weld = np.unique(owner, return_inverse=True)
     welded = weld[triangles]
     solid = (welded[:, 0] != welded[:, 1]) & (welded[:, 1] != welded[:, 2]) & (welded[:, 2] != welded[:, 0])
+    if not _has_area(points[kept], welded[solid], size):
+        raise InputError("the surface is empty: it has no triangle with an area")
     return Surface(
         vertices=np.ascontiguousarray(points[kept]),
         faces=welded[solid].astype(np.int32),
@@ -199,6 +204,13 @@ def weld_surface(
         parts=parts,
         polygons=polygons,
     )
+
+
+def _has_area(points: NDArray[np.float64], faces: NDArray[np.int64], size: float) -> bool:
+    """Whether any triangle is more than a line, per square of the surface's size."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return bool(area.max(initial=0.0) > _NO_AREA * size * size)
 
 
 def _joined_borders(

@@ -14,6 +14,7 @@ from warpjld.errors import InputError
 from warpjld.grasp.feature_normals import face_normals, feature_normals
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.triangle_tree import build_tree, join_trees
+from warpjld.runtime.query_mesh import query_mesh
 from warpjld.runtime.threads import in_threads, threads_for
 
 __all__ = ["Distances", "ObjectSet", "finite_points"]
@@ -56,11 +57,7 @@ class ObjectSet:
             raise InputError("objects: want at least one")
         self.device = checked_device(device)
         self._meshes = [
-            wp.Mesh(
-                wp.array(thing.vertices.astype(np.float32), dtype=wp.vec3, device=self.device),
-                wp.array(np.ascontiguousarray(thing.faces, np.int32).ravel(), dtype=wp.int32, device=self.device),
-                support_winding_number=not thing.report.solid,
-            )
+            query_mesh(thing.vertices, thing.faces, winding=not thing.report.solid, device=self.device)
             for thing in self.objects
         ]
         firsts = np.cumsum([0, *(len(thing.faces) for thing in self.objects)])[:-1]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -97,7 +99,8 @@ def _by_trimesh(path: Path) -> MeshFile:
     if kind == "3mf":
         check_archive(path)
     # not load_scene, which trimesh 4.5 does not have yet
-    loaded = trimesh.load(path, process=False, force="scene")
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):  # its readers print
+        loaded = trimesh.load(path, process=False, force="scene")
     scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene(loaded)
     vertices, faces, uvs, parts = [], [], [], []
     points = triangles = 0

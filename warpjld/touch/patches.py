@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from warpjld.geometry.normals import vertex_normals
 from warpjld.geometry.segment_distance import segment_distance
+from warpjld.runtime.query_mesh import query_mesh
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
@@ -162,7 +163,7 @@ def half_width(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArr
     wp.init()
     points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device="cpu")
     normals = wp.array(vertex_normals(vertices, faces), dtype=wp.vec3, device="cpu")
-    mesh = wp.Mesh(points, wp.array(faces.ravel(), dtype=wp.int32, device="cpu"))
+    mesh = query_mesh(points, faces)
     skip = 1e-5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     width = wp.empty(len(vertices), dtype=float, device="cpu")
     wp.launch(measure_width, len(vertices), inputs=[mesh.id, points, normals, skip], outputs=[width], device="cpu")

@@ -11,6 +11,7 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.fem.launch import shared
 from warpjld.geometry.rotations import unit
+from warpjld.runtime.query_mesh import query_mesh
 from warpjld.runtime.threads import in_threads, threads_for
 
 __all__ = ["Envelope", "checked_surface"]
@@ -65,11 +66,7 @@ class Envelope:
         wp.init()
         self._origin = points.mean(axis=0)
         local = ((points - self._origin) / self.size).astype(np.float32)
-        self._mesh = wp.Mesh(
-            points=wp.array(local, dtype=wp.vec3, device="cpu"),
-            indices=wp.array(triangles.reshape(-1), dtype=wp.int32, device="cpu"),
-            support_winding_number=True,
-        )
+        self._mesh = query_mesh(local, triangles.reshape(-1, 3), winding=True)
 
     @property
     def watertight(self) -> bool:

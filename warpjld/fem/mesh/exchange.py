@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -37,10 +39,13 @@ def read_volume_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
         raise MissingExtraError("reading volume meshes", "mesh") from error
     if not path.is_file():
         raise InputError("no such file", path=path)
+    said = io.StringIO()
     try:
-        read = meshio.read(path)
+        with redirect_stdout(said), redirect_stderr(said):  # meshio prints what is wrong, and exits
+            read = meshio.read(path)
     except (Exception, SystemExit) as error:
-        raise InputError(f"meshio cannot read it: {error}", path=path) from error
+        told = " ".join(said.getvalue().split())[:300] if isinstance(error, SystemExit) else error
+        raise InputError(f"meshio cannot read it: {told}", path=path) from error
     elements, marks = [], []
     label = next((name for name in ("region", "gmsh:physical", "medit:ref") if name in read.cell_data), None)
     for number, block in enumerate(read.cells):

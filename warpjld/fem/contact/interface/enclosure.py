@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.runtime.query_mesh import query_mesh
 
 __all__ = ["Enclosure"]
 
@@ -32,15 +33,12 @@ class Enclosure:
 
     def move(self, x: Array) -> None:
         """Set the positions of all nodes, x (N, 3) [m]."""
-        import warp as wp
 
         here = x[self.nodes]
         self.low, self.high = here.min(axis=0), here.max(axis=0)
         self._origin, self._size = here.mean(axis=0), float(np.linalg.norm(self.high - self.low))
         local = ((here - self._origin) / self._size).astype(np.float32)
-        indices = wp.array(self._triangles.reshape(-1), dtype=wp.int32, device="cpu")
-        points = wp.array(local, dtype=wp.vec3, device="cpu")
-        self._mesh = wp.Mesh(points=points, indices=indices, support_winding_number=True)
+        self._mesh = query_mesh(local, self._triangles.reshape(-1, 3), winding=True)
 
     def ask(self, points: Array, farthest: float) -> tuple[Array, Ints]:
         """Signed distances of points (n, 3), negative inside [m], shape (n,), and their nearest faces, shape (n,).

@@ -14,6 +14,7 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints, Points
 from warpjld.fem.mesh.envelope import checked_surface
+from warpjld.runtime.query_mesh import query_mesh
 from warpjld.runtime.threads import in_threads, threads_for
 
 __all__ = ["CREASE", "Facets", "Place"]
@@ -81,11 +82,7 @@ class Facets:
         self._features(normals)
         local = wp.array(self._local(vertices), dtype=wp.vec3, device="cpu")
         # a new hierarchy: one refitted after large deformation makes queries slow
-        self._mesh = wp.Mesh(
-            points=local,
-            indices=wp.array(self.faces.ravel(), dtype=wp.int32, device="cpu"),
-            support_winding_number=True,
-        )
+        self._mesh = query_mesh(local, self.faces, winding=True)
 
     def project(self, points: Points) -> ClosestPoints:
         """Signed distances, closest points and normals of points (n, 3) [m]."""
