@@ -1,8 +1,8 @@
 """Script for pages whose WebGL is computed in software: fewer pixels while the view moves, more when it is at rest.
 
 Without a graphics card a browser spends most of an update on pixels, and twice as much with multisampling. viser can
-neither switch that off nor change the resolution by itself, so the page does it. Browsers that draw with a graphics card
-are left as they are.
+neither switch that off nor change the resolution by itself, so the page does it. Browsers that draw with a graphics
+card are left as they are.
 """
 
 from __future__ import annotations
