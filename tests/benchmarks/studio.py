@@ -24,8 +24,6 @@ __all__ = ["FLAGS", "WATCH", "Measured", "measure", "processor_times"]
 FLAGS = [
     "--headless=new",
     "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-background-networking",
 ]
@@ -78,11 +76,14 @@ _DRAG = """async ([id, seconds, alone]) => {
   let k = 0;
   while (performance.now() - first.time < 1000 * seconds) {
     const before = shown.drawn, began = performance.now();
-    document.dispatchEvent(new MouseEvent('mousemove', at(0.4 + 0.55 * Math.abs(((k++ / 20) % 2) - 1))));
+    const there = at(0.4 + 0.55 * Math.abs(((k++ / 20) % 2) - 1));
+    document.dispatchEvent(new PointerEvent('pointermove', there));
+    document.dispatchEvent(new MouseEvent('mousemove', there));
     await next();
     while (alone && shown.drawn === before && performance.now() - began < 3000) await next();
     if (alone) delays.push(performance.now() - began);
   }
+  document.dispatchEvent(new PointerEvent('pointerup', at(0.5)));
   document.dispatchEvent(new MouseEvent('mouseup', at(0.5)));
   const spent = (performance.now() - first.time) / 1000;
   delays.sort((a, b) => a - b);

@@ -22,8 +22,6 @@ from warpjld.studio.room import Room
 _FLAGS = [
     "--headless=new",
     "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-quic",
     "--no-first-run",
@@ -101,10 +99,16 @@ class Window:
 
         def same() -> bool:
             seen.append(self.pixels())
-            return bool(np.array_equal(seen[-1], seen[-2]))
+            return self.fine() and bool(np.array_equal(seen[-1], seen[-2]))
 
         until(same, "the canvas is still")
         return seen[-1]
+
+    def fine(self) -> bool:
+        """Whether the canvas has the resolution of a view at rest, by ``page.software_drawing``."""
+        size = "(() => {const c = document.querySelector('canvas[data-engine]'); return [c.width, c.clientWidth]})()"
+        width, shown = self.page.evaluate(size)
+        return bool(width > 1.2 * shown)
 
     def skin(self) -> int:
         """How many pixels are reddish, as skin is."""

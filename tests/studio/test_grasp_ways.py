@@ -14,6 +14,7 @@ from warpjld.script.grasping import Attempt
 from warpjld.script.scene import Actor, Scene
 from warpjld.studio.document import ScriptDocument
 from warpjld.studio.grasp_ways import find_ways
+from warpjld.studio.opening import opened_document
 from warpjld.studio.performance import Performance
 from warpjld.studio.state import StudioState
 
@@ -126,6 +127,31 @@ def test_what_searches_is_deferred_and_dropped_where_the_script_has_changed(
     finish()
     assert state.document.text == f"{HAND}RATE 25\n"
     assert "not used" in state.messages[-1]
+
+
+def test_a_script_that_searches_is_opened_first_and_searched_in_the_background(
+    tmp_path: Path, searched: list[str]
+) -> None:
+    script, table = tmp_path / "grasp.jld", tmp_path / "later.jld"
+    table.write_text("RATE 25\n")
+    script.write_text(f'{HAND}{AUTO} POSTURE SPHERE\nINCLUDE "later.jld"\n')
+    state = opened_document(script, tmp_path / "out")
+    assert searched == []
+    assert list(state.scene.actors) == ["LEFT"]  # what comes before the search is there
+    assert list(state.scene.props) == ["B"]
+    assert not state.broken
+    begun = []
+    state.begin(lambda text, then: begun.append((text, then)))
+    ((text, then),) = begun
+    assert text == state.document.text
+    ran = state.performance.beside()
+    ran.run(text, script)
+    state.performance.learn(ran)
+    then()
+    assert searched == ["sphere"]
+    assert round(bend(state.scene)) == 6
+    assert state.scene.rate == 25  # the file named after the search may be read, too
+    assert len(begun) == 1
 
 
 def test_files_that_changed_are_read_again(tmp_path: Path, searched: list[str]) -> None:

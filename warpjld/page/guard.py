@@ -15,6 +15,8 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from warpjld.page.software_drawing import add_to_page
+
 __all__ = ["RequestGuard", "guarding"]
 
 _COOKIE = "warpjld_studio"
@@ -113,6 +115,7 @@ def guarding(guard: RequestGuard) -> Iterator[None]:
 
 def _first(guard: RequestGuard, answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     """Request handler that asks the guard before ``answer``."""
+    changed: dict[bytes, bytes] = {}
 
     def process(connection: Any, request: Any) -> Any:
         reason = guard.refuses(request.path, request.headers)
@@ -121,6 +124,7 @@ def _first(guard: RequestGuard, answer: Callable[[Any, Any], Any]) -> Callable[[
         response = answer(connection, request)
         cookie = guard.cookie(request.path)
         if response is not None:
+            add_to_page(response, changed)
             response.headers["Content-Security-Policy"] = guard.ancestors
             response.headers["Referrer-Policy"] = "no-referrer"
             if cookie is not None:

@@ -18,6 +18,7 @@ _NEW = "HAND LEFT BUILTIN\n"
 def opened_document(path: Path | None, folder: Path, *, device: str = "cpu") -> StudioState:
     """State of a studio with a script (.jld), a rig, or the built-in hand.
 
+    A script that searches for grasps is run up to the first search; a room searches in the background.
     Files may be read from the script's folder, and elsewhere those that the script names when it is opened.
 
     Raises:
@@ -33,7 +34,7 @@ def opened_document(path: Path | None, folder: Path, *, device: str = "cpu") -> 
         document = ScriptDocument(path.resolve().with_suffix(".jld"), _staging(path))
     if document.autosaved.is_file() and (kept := read_text(document.autosaved)) != document.text:
         document.edit(kept)  # the autosaved text of an earlier session; undo restores the file's text
-    return StudioState(document, folder, within=readable(document), device=device)
+    return StudioState(document, folder, within=readable(document), device=device, wait=True)
 
 
 def readable(document: ScriptDocument) -> list[Path]:
@@ -55,7 +56,6 @@ def _named(document: ScriptDocument) -> list[Path]:
     """Files that a script reads."""
     from warpjld.studio.performance import Performance
 
-    trial = Performance(Path("out"), say=lambda line: None)
     with suppress(WarpjldError):  # errors of the script are shown in the studio
-        trial.run(document.text, document.path)
-    return [*trial.scene.read]
+        return Performance(Path("out"), say=lambda line: None).read_by(document.text, document.path)
+    return []

@@ -5,9 +5,11 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from warpjld.errors import WarpjldError
 from warpjld.script.interpreter import Interpreter
 from warpjld.script.moment import Moment, moment_of
 from warpjld.script.parser import parse
@@ -76,7 +78,12 @@ class Performance:
         return self._interpreter.macros
 
     def run(
-        self, text: str, path: Path, progress: Callable[[str, int, int], None] = lambda what, done, total: None
+        self,
+        text: str,
+        path: Path,
+        progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+        *,
+        searching: bool = True,
     ) -> None:
         """Bring the scene to the state after this script; statements that ran already are not run again.
 
@@ -84,6 +91,7 @@ class Performance:
             text: Text of the script.
             path: File of the script; it need not exist yet.
             progress: Called before each statement with its command, the count of statements done, and their total.
+            searching: Whether grasps are searched for; if not, ``scene`` is the state before the first search.
 
         Raises:
             InputError: A statement fails; names line and column. ``scene`` is then the state before this statement.
@@ -96,6 +104,8 @@ class Performance:
         self._go_on_from_known(nodes)
         begin = len(self._done)
         for number in range(begin, len(nodes)):
+            if not searching and _searches(nodes[number], self._interpreter.macros):
+                return
             progress(nodes[number].name.text, number - begin, len(nodes) - begin)
             if number - self._kept[-1].number >= _APART:
                 self._keep(number)
@@ -111,6 +121,18 @@ class Performance:
                 self._keep(number + 1)
             if _searches(nodes[number], self._interpreter.macros):
                 self._learn(self._done, self._kept[-1].moment)
+
+    def read_by(self, text: str, path: Path) -> list[Path]:
+        """Files that a script reads, found by running what needs no search; statements that fail are skipped.
+
+        Raises:
+            InputError: The text cannot be parsed.
+        """
+        for node in parse(text, str(path)):
+            if not _searches(node, self._interpreter.macros):
+                with suppress(WarpjldError):
+                    self._interpreter.execute((node,), path)
+        return [*self.scene.read]
 
     def searches(self, text: str, path: Path) -> bool:
         """Whether running this text would search for grasps, which takes long and should run in a copy (``beside``).

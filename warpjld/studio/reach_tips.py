@@ -1,4 +1,4 @@
-"""Inverse kinematics of fingertips: joint angles near the present ones, within limits, that reach given positions."""
+"""Inverse kinematics of fingertips and wrists: joint angles within limits, near the present ones, that reach places."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpjld.script.scene import Actor
 from warpjld.skeleton import CHANNELS, DIGITS, poses_from_angles
 
-__all__ = ["reach_tips", "tips"]
+__all__ = ["reach_tips", "reach_wrist", "tips"]
 
 _NEAR = 2e-3  # weight of changes of the angles [1/rad], against distances relative to the hand's length
 _BEGIN = (0.05, 0.35)
@@ -37,16 +37,40 @@ def reach_tips(
         targets: Target positions of the tips by digit [m], shape (3,); digits not named keep their angles.
         wrist: Whether the wrist may move as well.
     """
+    ends = tips(actor, side)
+    free = _free(actor, side, [*targets], wrist)
+    return _reached(actor, frame, {ends[digit]: place for digit, place in targets.items()}, free)
+
+
+def reach_wrist(actor: Actor, side: str, frame: float, target: NDArray[np.float64]) -> dict[str, float]:
+    """Angles [degrees] of the joints above a wrist with which it comes nearest to a world position [m], shape (3,).
+
+    Empty for a hand alone, whose wrist has no joint above it: it is moved as a whole.
+    """
+    skeleton = actor.skeleton
+    wrist = skeleton.names.index(f"{side}.wrist")
+    above, joint = [], int(skeleton.parents[wrist])
+    while joint >= 0 and skeleton.parents[joint] >= 0:  # the root stays
+        above.append(joint)
+        joint = int(skeleton.parents[joint])
+    columns = range(len(CHANNELS))
+    limits = skeleton.limits
+    free = [(j, c) for j in reversed(above) for c in columns if limits[j, c, 0] < limits[j, c, 1]]
+    return _reached(actor, frame, {wrist: target}, free) if free else {}
+
+
+def _reached(
+    actor: Actor, frame: float, targets: Mapping[int, NDArray[np.float64]], free: Sequence[tuple[int, int]]
+) -> dict[str, float]:
+    """Angles [degrees] of the free joints and channels that bring joints nearest to world positions [m]."""
     from scipy.optimize import least_squares
 
     skeleton = actor.skeleton
     base = np.clip(actor.motion.sample([frame], skeleton, limits="clamp")[0][0], *np.moveaxis(skeleton.limits, -1, 0))
-    free = _free(actor, side, [*targets], wrist)
     joints, columns = np.array(free, dtype=int).T
     low, high = skeleton.limits[joints, columns].T
     start = np.clip(base[joints, columns], low + 1e-9, high - 1e-9)
-    ends = np.array([tips(actor, side)[digit] for digit in targets])
-    wanted = np.stack([targets[digit] for digit in targets])
+    ends, wanted = np.array([*targets]), np.stack([*targets.values()])
     length = float(np.linalg.norm(skeleton.rest[ends] - skeleton.rest[skeleton.parents[joints[0]]], axis=1).max())
 
     def residuals(values: NDArray[np.float64]) -> NDArray[np.float64]:

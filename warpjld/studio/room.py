@@ -27,6 +27,7 @@ from warpjld.studio.panels.sliders import SlidersPanel
 from warpjld.studio.panels.stage import StagePanel
 from warpjld.studio.panels.things import ThingsPanel
 from warpjld.studio.panels.timeline import TimelinePanel
+from warpjld.studio.panels.views import ViewsPanel
 from warpjld.studio.panels.work import WorkPanel
 from warpjld.studio.performance import Performance
 from warpjld.studio.state import StudioState
@@ -58,7 +59,7 @@ class Room:
         self.panels: list[Any] = []
         self._kept = state.document.text
         self._furnish()
-        state.defer = self._beside
+        state.begin(self._beside)
         shown = LOCAL if host in ("0.0.0.0", "::") else host
         shown = f"[{shown}]" if ":" in shown else shown
         self.address = f"http://{shown}:{self.server.get_port()}/" + (f"?token={token}" if token else "")
@@ -95,7 +96,8 @@ class Room:
         self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs, so always visible
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
-            self.stage, ghosts, pose = StagePanel(self), GhostsPanel(self), PoseToolsPanel(self)
+            self.stage, ghosts, views = StagePanel(self), GhostsPanel(self), ViewsPanel(self)
+            pose = PoseToolsPanel(self)
             self.drag, self.things, self.skin = DragPanel(self), ThingsPanel(self), SkinPanel(self)
             self.selected, sliders = SelectedPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
@@ -110,7 +112,7 @@ class Room:
         with below.add_tab("Keys"):
             curves = CurvesPanel(self)
         below.dock_below(gui.main_panel)
-        posing = [self.stage, ghosts, pose, self.drag, self.things, self.skin, self.selected, sliders]
+        posing = [self.stage, ghosts, views, pose, self.drag, self.things, self.skin, self.selected, sliders]
         self.panels = [*posing, script, files, work, menus, timeline, curves, self.progress, messages]
 
     def _beside(self, text: str, then: Callable[[], object]) -> None:

@@ -33,6 +33,7 @@ class StudioState:
         folder: The output folder.
         within: Folders that files may be read from; None for anywhere.
         device: Warp device of the covering.
+        wait: Whether a script with grasp searches is run only up to the first of them until ``begin``.
 
     Attributes:
         document: The script.
@@ -45,7 +46,7 @@ class StudioState:
         solved: The contact that was solved last.
         preview: Script text and a scene that is shown instead of its own, until the script changes; None without one.
         defer: Function that runs a text with grasp searches in the background and then calls a continuation; None: such
-            texts are run at once.
+            texts are run at once, or wait for ``begin``.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class StudioState:
         *,
         within: Sequence[Path] | None = None,
         device: str = "cpu",
+        wait: bool = False,
     ) -> None:
         self.document = document
         self.folder = folder
@@ -71,6 +73,7 @@ class StudioState:
         self.performance = Performance(folder, say=self.messages.append, within=within)
         self._actor: str | None = None
         self._angles: tuple[object, dict[str, float]] | None = None
+        self._waiting = wait
         self._run()
 
     # ---- state shown --------------------------------------------------------------------------------------------
@@ -175,6 +178,13 @@ class StudioState:
             raise self.error
         return self.performance.copied()
 
+    def begin(self, defer: Callable[[str, Callable[[], object]], None]) -> None:
+        """Run texts with grasp searches by ``defer`` from now on, and first the document if it has waited for this."""
+        self.defer = defer
+        waited, self._waiting = self._waiting, False
+        if waited and not self.broken:
+            self._run()
+
     # ---- edits of the script -------------------------------------------------------------------------------------
 
     def write(self, text: str, kind: Hashable = None) -> None:
@@ -257,16 +267,20 @@ class StudioState:
             self.messages.append("a search has ended, but the script was changed meanwhile: its result is not used")
 
     def _deferred(self, text: str, then: Callable[[], object]) -> bool:
-        """Start running a text in the background if it has grasp searches; returns whether it did."""
-        if self.defer is None or not self.performance.searches(text, self.document.path):
+        """Start running a text in the background if it has grasp searches, or let it wait; returns whether it did."""
+        if self.defer is None and not self._waiting:
             return False
-        self.defer(text, then)
+        if not self.performance.searches(text, self.document.path):
+            return False
+        if self.defer is not None:
+            self.defer(text, then)
         return True
 
     def _run(self) -> None:
         try:
             if self._deferred(self.document.text, self._run):
                 self.error, self.broken = None, False
+                self.performance.run(self.document.text, self.document.path, searching=False)  # what is known so far
                 return
             self.performance.run(self.document.text, self.document.path)
         except WarpjldError as error:

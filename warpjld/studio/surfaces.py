@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from warpjld.render.colors import ColorScale
 from warpjld.script.crowd import Crowd, Role
+from warpjld.script.outputs import CameraSetting
 from warpjld.script.pressure import PressureView
 from warpjld.script.runner import cast
 from warpjld.script.scene import Actor, Scene
 
 if TYPE_CHECKING:
+    from warpjld.render import Camera
     from warpjld.simulation.display.surfaces import DeformedSurfaces
 
 __all__ = ["COLORINGS", "Coloring", "Shown", "Surfaces"]
@@ -70,6 +72,10 @@ class Surfaces:
         for prop, vertices in zip(crowd.props, crowd.solid_vertices(0), strict=True):
             shown.append(Shown(prop.name, vertices.astype(np.float32), prop.thing.faces, prop.color))
         return shown
+
+    def camera(self, scene: Scene, frame: float, view: str, size: tuple[int, int]) -> Camera:
+        """Camera of a named view of a scene with actors at a frame, for pictures with this width and height."""
+        return self._crowd(scene, frame).camera(CameraSetting(view), size)
 
     def contacts(self, scene: Scene, frame: float, pressed: DeformedSurfaces) -> NDArray[np.float32]:
         """Points in contact, on skin and on deformable objects [m], shape (n, 3)."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from warpjld.skeleton import DIGITS
+
 if TYPE_CHECKING:
     from warpjld.studio.room import Room
 
@@ -39,7 +41,7 @@ class SlidersPanel:
         self._folders, self._sliders = [], {}
         gui = self._room.server.gui
         with self._parent:
-            for part, names in groupby(sorted(channels, key=_part), key=_part):
+            for part, names in groupby(sorted(channels, key=_order), key=_part):
                 folder = gui.add_folder(part, expand_by_default=part.endswith("index"))
                 self._folders.append(folder)
                 with folder:
@@ -70,6 +72,12 @@ def show_angle(room: Room, slider: Any, name: str, degrees: float) -> None:
     """Set a channel's slider, unless it is being dragged."""
     if abs(slider.value - degrees) > 0.5 * _STEP and not room.worker.waits(("angle", name)):
         slider.value = degrees
+
+
+def _order(channel: str) -> tuple[str, int]:
+    """Sorts channels by side, then from the wrist over the thumb to the little finger."""
+    side, _, digit = _part(channel).partition(" ")
+    return side, DIGITS.index(digit) if digit in DIGITS else -1
 
 
 def _part(channel: str) -> str:

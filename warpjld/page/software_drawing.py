@@ -1,0 +1,79 @@
+"""Script for pages whose WebGL is computed in software: fewer pixels while the view moves, more when it is at rest.
+
+Without a graphics card a browser spends most of an update on pixels, and twice as much with multisampling. viser can
+neither switch that off nor change the resolution by itself, so the page does it. Browsers that draw with a graphics
+card are left as they are.
+"""
+
+from __future__ import annotations
+
+import gzip
+from typing import Any
+
+__all__ = ["add_to_page"]
+
+_SCRIPT = """<script>
+(() => {
+  const MOVING = 0.5, AT_REST = 1.5;  // canvas pixels per CSS pixel; at rest instead of multisampling
+  const REST = 350;  // without change, after which the view is at rest [ms]
+  const own = HTMLCanvasElement.prototype.getContext;
+  const probe = own.call(document.createElement("canvas"), "webgl2");
+  const info = probe && probe.getExtension("WEBGL_debug_renderer_info");
+  const renderer = probe ? String(probe.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : probe.RENDERER)) : "";
+  if (probe) probe.getExtension("WEBGL_lose_context")?.loseContext();
+  if (!/swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer)) return;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return own.call(this, kind, /webgl/.test(kind) ? {...options, antialias: false} : options);
+  };
+  if (new URLSearchParams(location.search).has("fixedDpr")) return;  // viser's parameter: the user chose
+  const settings = () => window.__viserTestpoints?.devSettings;
+  const resolve = ratio => settings()?.set?.({fixedDpr: ratio});
+  let timer = 0, changed = -Infinity, counted = false, held = false;
+  const rest = () => {
+    if (settings() && !held) resolve(Math.max(AT_REST, devicePixelRatio));
+    else timer = setTimeout(rest, REST);
+  };
+  const moving = () => {
+    resolve(MOVING);
+    clearTimeout(timer);
+    timer = setTimeout(rest, REST);
+  };
+  addEventListener("pointermove", event => { if (held = event.buttons > 0) moving(); }, true);
+  for (const kind of ["pointerup", "pointercancel", "blur"]) addEventListener(kind, () => { held = false; }, true);
+  addEventListener("wheel", event => { if (event.target instanceof HTMLCanvasElement) moving(); }, true);
+  for (const name of ["bufferData", "bufferSubData"]) {  // surfaces that change in frame after frame
+    const original = WebGL2RenderingContext.prototype[name];
+    WebGL2RenderingContext.prototype[name] = function (...given) {
+      if (!counted) {
+        counted = true;
+        const now = performance.now(), again = now - changed < REST;
+        changed = now;
+        setTimeout(() => { counted = false; if (again) moving(); });
+      }
+      return original.apply(this, given);
+    };
+  }
+  rest();
+})();
+</script>
+"""
+
+
+def add_to_page(response: Any, known: dict[bytes, bytes]) -> None:
+    """Put the script into the head of an HTTP response that is viser's page; others are left as they are.
+
+    Args:
+        response: Response of ``websockets``.
+        known: Pages that have been changed already, by what they were.
+    """
+    if "text/html" not in response.headers.get("Content-Type", "") or not response.body:
+        return
+    packed = response.headers.get("Content-Encoding") == "gzip"
+    if response.body not in known:
+        page = (gzip.decompress(response.body) if packed else response.body).replace(
+            b"<head>", b"<head>\n" + _SCRIPT.encode(), 1
+        )
+        known[response.body] = gzip.compress(page) if packed else page
+    response.body = known[response.body]
+    del response.headers["Content-Length"]
+    response.headers["Content-Length"] = str(len(response.body))
