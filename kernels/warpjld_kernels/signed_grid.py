@@ -146,12 +146,19 @@ def measure_near(
 def least_distances(
     grid: SignedGrid,
     solids: Solids,
-    # points in the object's frame
-    points: wp.array(dtype=wp.vec3),
+    # poses of a skin, in the object's frame
+    points: wp.array2d(dtype=wp.vec3),
+    # neighbours of every vertex, those of a vertex one after another
+    first_of: wp.array(dtype=wp.int32),
+    others: wp.array(dtype=wp.int32),
     # out
-    least_out: wp.array(dtype=float),
+    least_out: wp.array2d(dtype=float),
 ):
-    """Lower bounds of the signed distances of points [m]."""
-    n = wp.tid()
-    two = distance_bounds(solids, grid, wp.vec3d(points[n]))
-    least_out[n] = float(two[0])
+    """Lower bounds of the signed distances of everything on the edges at a vertex [m]."""
+    pose, n = wp.tid()
+    at = points[pose, n]
+    two = distance_bounds(solids, grid, wp.vec3d(at))
+    longest = float(0.0)
+    for k in range(first_of[n], first_of[n + 1]):
+        longest = wp.max(longest, wp.length(points[pose, others[k]] - at))
+    least_out[pose, n] = float(two[0]) - longest

@@ -205,7 +205,10 @@ def facets_near_origin(
     ridges: wp.array2d(dtype=wp.uint64),
     normals: wp.array2d(dtype=wp.float64),
 ) -> int:
-    """Number of normals, the nearest facet first, or alone if it goes through the origin; −1 where points are not in general position, or there is no room."""
+    """Number of normals, the nearest facet first, or alone if it goes through the origin.
+
+    −1 where points are not in general position, or there is no room.
+    """
 
 
 @wp.kernel

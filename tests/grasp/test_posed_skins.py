@@ -53,8 +53,15 @@ def test_crossings_are_those_of_every_pair(covering, skins) -> None:
         np.add.at(exact, tuple(posed.parts.of_face[pairs].T), 1)
         np.testing.assert_array_equal(table, exact + exact.T)
     assert found[2].any()
-    part = np.array([1, 2, 1], dtype=np.int32)
-    np.testing.assert_array_equal(posed.crossings(skins, part), found[np.arange(3), part])
+    # limits of all sizes: none, what there is, and one less
+    rng = np.random.default_rng(0)
+    most = np.maximum(found - rng.integers(0, 3, found.shape), 0)
+    most = np.triu(most, 1) + np.triu(most, 1).transpose(0, 2, 1)
+    np.testing.assert_array_equal(posed.cross_more(skins, most), found > most)
+    for part in range(len(posed.parts.names)):
+        asked = np.full(3, part, dtype=np.int32)
+        more = posed.part_crosses_more(skins, asked, most[:, part])
+        np.testing.assert_array_equal(more, (found > most)[:, part].any(axis=1))
 
 
 def test_a_pose_is_what_it_is_alone(covering, skins) -> None:

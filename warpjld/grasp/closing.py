@@ -17,8 +17,9 @@ from warpjld.covering.device import array_on
 from warpjld.grasp.moving_skin import skin_beyond, skin_that_moves
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import Places
-from warpjld.grasp.packing import Chains, drives_on, posture_on, skin_on
+from warpjld.grasp.packing import Chains, drives_arrays, fill_drives, fill_posture, posture_arrays, skin_on
 from warpjld.grasp.search_result import SearchStatus
+from warpjld.grasp.struct_arrays import StructArrays
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.skeleton.channels import FLEXION
 
@@ -40,6 +41,7 @@ class MovedSkin:
         self.covering = covering
         self._beyond: dict[int, NDArray[np.int32]] = {}
         self._moving: dict[tuple[int, ...], NDArray[np.int32]] = {}
+        self._searched: dict[tuple[tuple[int, ...], int], tuple[Any, Any, int]] = {}
 
     @cached_property
     def packed(self) -> Any:
@@ -57,6 +59,22 @@ class MovedSkin:
         if joints not in self._moving:
             self._moving[joints] = skin_that_moves(self.covering, joints)
         return self._moving[joints]
+
+    def searched(self, joints: tuple[int, ...], every: int) -> tuple[Any, Any, int]:
+        """Every so manieth vertex beyond each of these joints.
+
+        Returns:
+            Warp arrays of these vertices, one joint's after another, and of where each joint's begin; and the number
+            of those of the joint with most.
+        """
+        import warp as wp
+
+        if (joints, every) not in self._searched:
+            vertices = [self.beyond(joint)[::every] for joint in joints]
+            first = np.cumsum([0, *map(len, vertices)])
+            arrays = (array_on("cpu", a, wp.int32) for a in (np.concatenate(vertices), first))
+            self._searched[joints, every] = (*arrays, max(map(len, vertices)))
+        return self._searched[joints, every]
 
 
 class ClosingHands:
@@ -143,16 +161,15 @@ class ClosingHands:
         from warpjld_kernels.first_touch import first_touch
 
         count, moving = len(hands), rates != 0.0
-        vertices = [self._skin.beyond(int(chain[0]))[:: self._every] for chain in joints]
-        first = np.cumsum([0, *map(len, vertices)])
+        vertices, first, most = self._skin.searched(tuple(joints[:, 0].tolist()), self._every)
         frames, used = np.repeat(np.arange(count), len(joints)), np.tile(joints[:, moving], (count, 1))
         packed = self._on_object(hands, frames, used, rates[moving])
         status = np.empty((count, len(joints)), dtype=np.int32)
         closing = np.empty(status.shape, dtype=np.float32)
-        earliest = np.empty((status.size, max(map(len, vertices))), dtype=np.float32)
+        earliest = np.empty((status.size, most), dtype=np.float32)
         inputs = [
-            array_on("cpu", np.concatenate(vertices), wp.int32),
-            array_on("cpu", first, wp.int32),
+            vertices,
+            first,
             self._tolerance,
             self._tolerance,
             wp.array(earliest, dtype=float, device="cpu", copy=False),
@@ -268,7 +285,6 @@ class ClosingHands:
     ) -> Any:
         """``warpjld_kernels.first_touch.Hands``: R chains of k joints, each in one of the frames of n hands."""
         import warp as wp
-        from warpjld_kernels.first_touch import Hands
 
         angles, skeleton = self.angles[hands], self._skeleton
         starts = angles[frames[:, None], joints, FLEXION]
@@ -284,13 +300,23 @@ class ClosingHands:
         )
         poses = self.poses_of(hands, angles)
         origin = poses.positions[:, 0]
-        out = Hands()
-        out.solids, out.grid, out.skin = self._near.objects.solids, self._near.grid, self._skin.packed
-        out.posture = posture_on("cpu", skeleton, poses, origin)
-        out.drives = drives_on("cpu", skeleton, poses, angles, chains)
-        out.position = array_on("cpu", self._places.position[hands] - origin, wp.vec3)
-        out.rotation = array_on("cpu", self._places.rotation[hands], wp.quat)
-        return out
+        posture, drives, out = self._arrays
+        fill_posture(posture, skeleton, poses, origin)
+        fill_drives(drives, skeleton, poses, angles, chains)
+        out.fill("position", self._places.position[hands] - origin, wp.vec3)
+        out.fill("rotation", self._places.rotation[hands], wp.quat)
+        # structs are copied where they are set: their arrays may have been made anew
+        out.struct.posture, out.struct.drives = posture.struct, drives.struct
+        return out.struct
+
+    @cached_property
+    def _arrays(self) -> tuple[StructArrays, StructArrays, StructArrays]:
+        """Posture, drives and what holds them, ``warpjld_kernels.first_touch.Hands``, filled anew for each launch."""
+        from warpjld_kernels.first_touch import Hands
+
+        hands = Hands()
+        hands.solids, hands.grid, hands.skin = self._near.objects.solids, self._near.grid, self._skin.packed
+        return posture_arrays("cpu"), drives_arrays("cpu"), StructArrays(hands, "cpu")
 
     def _depths(
         self, hands: NDArray[np.int64], vertices: NDArray[np.int32], angles: NDArray[np.float64]

@@ -136,8 +136,9 @@ class Judge:
             depths: Penetration depths of hands and object [m], see ``HandObjectGaps``, shape (G,).
         """
         hands = self.pressing(poses, vertices)
-        how = {"torque_scale": self._radius, "edges": _EDGES}
-        epsilons = least_resistances([hand.contacts for hand in hands], self._center, **how)
+        epsilons = least_resistances(
+            [hand.contacts for hand in hands], self._center, torque_scale=self._radius, edges=_EDGES
+        )
         return [
             Verdict(epsilon > 0.0, epsilon, hand.digits, hand.palm, max(float(depth), hand.depth))
             for hand, epsilon, depth in zip(hands, epsilons, depths, strict=True)
@@ -160,9 +161,7 @@ class Judge:
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
         return touching_patches(finer, parts, self.both.near, local, tolerance)
 
-    def _pressing(
-        self, poses: Poses, patches: list[ContactPatches], depths: NDArray[np.float64]
-    ) -> list[Pressing]:
+    def _pressing(self, poses: Poses, patches: list[ContactPatches], depths: NDArray[np.float64]) -> list[Pressing]:
         """What presses of the patches of every hand."""
         names = [name for own in patches for name in own.names]
         if not names:

@@ -99,16 +99,21 @@ class NearObject:
         self.least_by_part(points, np.arange(count, dtype=np.int32), np.zeros(count, dtype=np.int32), gaps)
         return gaps[:, 0]
 
-    def at_least(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Lower bounds, from the grid, of signed distances of points (…, 3) in the object's frame [m], shape (…)."""
+    def at_least(self, points: NDArray[np.floating], beside: tuple[Any, Any]) -> NDArray[np.float32]:
+        """Lower bounds, from the grid, of signed distances of all points on the edges at vertices [m], shape (G, V).
+
+        Args:
+            points: Vertices of G poses of a skin in the object's frame [m], shape (G, V, 3).
+            beside: Neighbours of every vertex, see ``FinerSkin.beside``.
+        """
         import warp as wp
         from warpjld_kernels.signed_grid import least_distances
 
         out = np.empty(points.shape[:-1], dtype=np.float32)
-        flat = np.ascontiguousarray(points, np.float32).reshape(-1, 3)
-        asked = wp.array(flat, dtype=wp.vec3, device="cpu", copy=False)
-        outs = [wp.array(out.reshape(-1), dtype=float, device="cpu", copy=False)]
-        wp.launch(least_distances, out.size, inputs=[self.grid, self.objects.solids, asked], outputs=outs, device="cpu")
+        asked = wp.array(np.ascontiguousarray(points, np.float32), dtype=wp.vec3, device="cpu", copy=False)
+        outs = [wp.array(out, dtype=float, device="cpu", copy=False)]
+        inputs = [self.grid, self.objects.solids, asked, *beside]
+        wp.launch(least_distances, out.shape, inputs=inputs, outputs=outs, device="cpu")
         return out
 
     def near(self, points: NDArray[np.floating], limit: float) -> NearPoints:

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from warpjld.covering import Covering
 from warpjld.grasp.digits import digit_chains, pad_vertex
+from warpjld.grasp.postures import POSTURES, posture_angles
 from warpjld.skeleton import poses_from_angles
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["Opening", "closing_in_air"]
+__all__ = ["Opening", "OpeningsOfPostures", "closing_in_air"]
 
 _STEPS = 15  # poses from open to curled
 _CURL = {"finger": (50.0, 45.0, 30.0), "thumb": (20.0, 40.0, 45.0)}  # flexion added to the joints, base first [degrees]
@@ -47,6 +48,22 @@ class Opening:
         """The last step at which the pads are at least this far apart; 0 where none is."""
         wide = np.flatnonzero(np.minimum.accumulate(self.width) >= width)
         return int(wide[-1]) if len(wide) else 0
+
+
+class OpeningsOfPostures:
+    """Closing motions of a hand from each of ``POSTURES``, which no object changes, computed once."""
+
+    def __init__(self, covering: Covering) -> None:
+        self._covering = covering
+        self._kept: dict[tuple[str, ...], list[Opening]] = {}
+
+    def of(self, side: str, digits: Sequence[str]) -> list[Opening]:
+        """One for each posture, by these digits; arguments as for ``closing_in_air``."""
+        key = (side, *digits)
+        if key not in self._kept:
+            starts = np.array([posture_angles(self._covering.skeleton, side, posture) for posture in POSTURES])
+            self._kept[key] = closing_in_air(self._covering, side, starts, digits)
+        return self._kept[key]
 
 
 def closing_in_air(covering: Covering, side: str, starts: NDArray[np.float64], digits: Sequence[str]) -> list[Opening]:

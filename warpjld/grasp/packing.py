@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,20 @@ from warpjld.covering.drivers import flexion_ratio, virtual_lengths
 from warpjld.covering.rows import Padded
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import conjugate, multiply
+from warpjld.grasp.struct_arrays import StructArrays
 from warpjld.skeleton import CHANNELS, Poses, Skeleton
 from warpjld.skeleton.channels import FLEXION
 
-__all__ = ["Chains", "drives_on", "posture_on", "skin_on"]
+__all__ = [
+    "Chains",
+    "drives_arrays",
+    "drives_on",
+    "fill_drives",
+    "fill_posture",
+    "posture_arrays",
+    "posture_on",
+    "skin_on",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,14 +115,24 @@ def skin_on(device: Any, coverings: Sequence[Covering]) -> Any:
 
 def posture_on(device: Any, skeleton: Skeleton, poses: Poses, origin: NDArray[np.float64]) -> Any:
     """``warpjld_kernels.closing_chain.Posture``, positions relative to an origin for every frame [m], shape (F, 3)."""
-    import warp as wp
+    return fill_posture(posture_arrays(device), skeleton, poses, origin)
+
+
+def posture_arrays(device: Any) -> StructArrays:
+    """A ``Posture`` without arrays, for ``fill_posture``."""
     from warpjld_kernels.closing_chain import Posture
 
-    posture = Posture()
-    posture.positions = array_on(device, poses.positions - origin[:, None], wp.vec3)
-    posture.rotations = array_on(device, poses.rotations, wp.quat)
-    posture.flexion_ratio = array_on(device, flexion_ratio(skeleton, poses.flexion), float)
-    return posture
+    return StructArrays(Posture(), device)
+
+
+def fill_posture(out: StructArrays, skeleton: Skeleton, poses: Poses, origin: NDArray[np.float64]) -> Any:
+    """``posture_on`` in arrays that are kept."""
+    import warp as wp
+
+    out.fill("positions", poses.positions - origin[:, None], wp.vec3)
+    out.fill("rotations", poses.rotations, wp.quat)
+    out.fill("flexion_ratio", flexion_ratio(skeleton, poses.flexion), float)
+    return out.struct
 
 
 def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.float64], chains: Chains) -> Any:
@@ -127,8 +148,21 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
     Raises:
         InputError: Joints of a chain that do not lie one beyond the other.
     """
-    import warp as wp
+    return fill_drives(drives_arrays(device), skeleton, poses, angles, chains)
+
+
+def drives_arrays(device: Any) -> StructArrays:
+    """``Drives`` without arrays, for ``fill_drives``."""
     from warpjld_kernels.closing_chain import Drives
+
+    return StructArrays(Drives(), device)
+
+
+def fill_drives(
+    out: StructArrays, skeleton: Skeleton, poses: Poses, angles: NDArray[np.float64], chains: Chains
+) -> Any:
+    """``drives_on`` in arrays that are kept."""
+    import warp as wp
 
     frame, joints = chains.frame, chains.joints
     used = joints >= 0
@@ -141,17 +175,12 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
         before = multiply(conjugate(skeleton.initial_turns[j]), before)
     bend = _turn(_about(direction, mirror * channels[..., CHANNELS.index("pivot")]), axis)
     after = _about(direction, -mirror * channels[..., CHANNELS.index("twisting")])
-    local = Rotation.from_quat(_flat(before)) * Rotation.from_quat(_flat(_about(bend, channels[..., FLEXION])))
+    first = Rotation.from_quat(_flat(before))
+    local = first * Rotation.from_quat(_flat(_about(bend, channels[..., FLEXION])))
     local = local * Rotation.from_quat(_flat(after))
     carried = Rotation.from_quat(_flat(poses.rotations[frame[:, None], j])) * local.inv()
-    world = (carried * Rotation.from_quat(_flat(before))).apply(bend.reshape(-1, 3)).reshape(bend.shape)
-    straight, level = (vectors[j] for vectors in skeleton.straight)
-    upright = straight - level * (straight * level).sum(axis=-1, keepdims=True)
-    length = np.linalg.norm(upright, axis=-1, keepdims=True)
-    upright = np.where(length > 1e-6, upright / np.maximum(length, 1e-12), 0.0)
-    largest = skeleton.limits[j, FLEXION, 1]
-    moves = (largest > 1e-6) & (skeleton.parents[j] >= 0)
-    out = Drives()
+    world = (carried * first).apply(bend.reshape(-1, 3)).reshape(bend.shape)
+    upright, level, slope = (constants[j] for constants in _bending(skeleton))
     for name, values, kind in (
         ("frame", frame, wp.int32),
         ("reach", chains.reach, float),
@@ -166,31 +195,48 @@ def drives_on(device: Any, skeleton: Skeleton, poses: Poses, angles: NDArray[np.
         ("after", after, wp.quat),
         ("direction", direction, wp.vec3),
         ("upright", upright, wp.vec3),
-        ("level", np.cross(level, upright), wp.vec3),
-        ("largest", np.where(moves, 1.0 / np.where(moves, largest, 1.0), 0.0), float),
+        ("level", level, wp.vec3),
+        ("largest", slope, float),
         ("depth", _depths(skeleton, joints), wp.int32),
     ):
-        setattr(out, name, array_on(device, values, kind))
-    return out
+        out.fill(name, values, kind)
+    return out.struct
+
+
+@lru_cache(maxsize=8)  # skeletons are compared by identity
+def _bending(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of every joint: where flexion is measured from and to, (J, 3), and 1 over its largest, 0 for none, (J,)."""
+    straight, level = skeleton.straight
+    upright = straight - level * (straight * level).sum(axis=-1, keepdims=True)
+    length = np.linalg.norm(upright, axis=-1, keepdims=True)
+    upright = np.where(length > 1e-6, upright / np.maximum(length, 1e-12), 0.0)
+    largest = skeleton.limits[:, FLEXION, 1]
+    moves = (largest > 1e-6) & (skeleton.parents >= 0)
+    return upright, np.cross(level, upright), np.where(moves, 1.0 / np.where(moves, largest, 1.0), 0.0)
 
 
 def _depths(skeleton: Skeleton, joints: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Number of a chain's joints among each joint of the skeleton and its ancestors, shape (R, J).
+    """Number of a chain's joints among each joint of the skeleton and its ancestors, shape (R, J)."""
+    # rows as numbers: sorting these is quicker than sorting rows
+    code = (joints.astype(np.int64) + 1) @ (len(skeleton) + 1) ** np.arange(joints.shape[1])
+    _, first, place = np.unique(code, return_index=True, return_inverse=True)
+    return np.array([_depths_of(skeleton, tuple(joints[k].tolist())) for k in first], dtype=np.int32)[place]
+
+
+@lru_cache(maxsize=1024)
+def _depths_of(skeleton: Skeleton, chain: tuple[int, ...]) -> tuple[int, ...]:
+    """Depths of one chain, for every joint.
 
     Raises:
-        InputError: Joints of a chain that do not lie one beyond the other.
+        InputError: Joints of the chain that do not lie one beyond the other.
     """
-    unique, place = np.unique(joints, axis=0, return_inverse=True)
-    out = np.zeros((len(unique), len(skeleton)), dtype=np.int32)
-    for row, chain in zip(out, unique, strict=True):
-        movers = [int(j) for j in chain if j >= 0]
-        for j in range(len(skeleton)):
-            parent = skeleton.parents[j]
-            row[j] = (row[parent] if parent >= 0 else 0) + (j in movers)
-        if [int(row[m]) for m in movers] != list(range(1, len(movers) + 1)):
-            names = ", ".join(skeleton.names[m] for m in movers)
-            raise InputError(f"joints that close together must lie one beyond the other, got {names}")
-    return out[place.ravel()]
+    movers, depths = [j for j in chain if j >= 0], [0] * len(skeleton)
+    for j, parent in enumerate(skeleton.parents.tolist()):
+        depths[j] = (depths[parent] if parent >= 0 else 0) + (j in movers)
+    if [depths[m] for m in movers] != list(range(1, len(movers) + 1)):
+        names = ", ".join(skeleton.names[m] for m in movers)
+        raise InputError(f"joints that close together must lie one beyond the other, got {names}")
+    return tuple(depths)
 
 
 def _about(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:

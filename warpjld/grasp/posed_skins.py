@@ -202,6 +202,7 @@ class PosedSkins:
         poses, names = len(vertices), len(self.parts.names)
         skins = self.fitted(vertices, Places.of(vertices.mean(axis=1, dtype=np.float64)))
         bits = np.uint64(1) << np.arange(min(names, _MOST_PARTS), dtype=np.uint64)
+        part_of: NDArray[np.integer]
         if part is None:
             pose_of, part_of = (rows.ravel() for rows in np.indices((poses, names)))
             later = np.array([bits[k + 1 :].sum(dtype=np.uint64) for k in range(names)], dtype=np.uint64)
@@ -212,7 +213,9 @@ class PosedSkins:
         counts = np.zeros(most.shape, dtype=np.int32)
         rows = (pose_of, part_of, others, self._by_part[1], self._by_part[0])
         kinds = (np.int32, np.int32, np.uint64, np.int32, np.int32)
-        inputs = [wp.array(np.ascontiguousarray(a, k), device="cpu", copy=False) for a, k in zip(rows, kinds, strict=True)]
+        inputs = [
+            wp.array(np.ascontiguousarray(a, k), device="cpu", copy=False) for a, k in zip(rows, kinds, strict=True)
+        ]
         allowed, out = (
             wp.array(np.ascontiguousarray(a, np.int32).reshape(-1, names), dtype=wp.int32, device="cpu", copy=False)
             for a in (most, counts)

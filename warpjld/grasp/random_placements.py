@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.geometry.rotations import unit
 from warpjld.grasp.approach_directions import free_ways
+from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import Obstacles
-from warpjld.grasp.opening import Opening, closing_in_air
+from warpjld.grasp.opening import Opening, OpeningsOfPostures, closing_in_air
 from warpjld.grasp.palm import palm_of
 from warpjld.grasp.placements import Candidates, across_widths, around, sample_wrists
-from warpjld.grasp.postures import AHEAD, CLOSING, POSTURES, posture_angles
+from warpjld.grasp.postures import AHEAD, CLOSING, posture_angles
 from warpjld.grasp.widths import Widths, sample_widths
 from warpjld.skeleton import CHANNELS, DIGITS
 
@@ -80,8 +81,7 @@ class Draws:
     @cached_property
     def _in_air(self) -> list[Opening]:
         """Opening of the hand in every posture while it closes on nothing."""
-        starts = np.array([posture_angles(self.covering.skeleton, self.side, posture) for posture in POSTURES])
-        return closing_in_air(self.covering, self.side, starts, self.closing)
+        return kept_with(self.covering, OpeningsOfPostures).of(self.side, self.closing)
 
     def narrowest(self, friction: float) -> float:
         """Smallest sampled width of the object that two contacts with this friction can hold [m].

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.device import array_on
 from warpjld.grasp.edges import edges_of_sides
 
 __all__ = ["FinerSkin"]
@@ -39,13 +43,10 @@ class FinerSkin:
             self.parents = np.concatenate([self.parents, self.parents[edges[:, 0]]])
             self._middles.append(edges)
 
-        # every vertex is also its own neighbour, so that no row is empty
-        own = np.arange(len(vertices))
-        beside = np.concatenate([faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel(), own])
-        others = np.concatenate([faces[:, [1, 2, 0]].ravel(), faces[:, [0, 1, 2]].ravel(), own])
-        order = np.argsort(beside, kind="stable")
-        self._edges = np.stack([beside[order], others[order]])
-        self._first_edge = np.searchsorted(beside[order], own)
+        own = np.concatenate([faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()])
+        others = np.concatenate([faces[:, [1, 2, 0]].ravel(), faces[:, [0, 1, 2]].ravel()])
+        order = np.argsort(own, kind="stable")
+        self._others, self._first_other = others[order], np.searchsorted(own[order], np.arange(len(vertices) + 1))
         order = np.argsort(self.faces.ravel(), kind="stable")
         self._around = order // 3
         self._first = np.searchsorted(self.faces.ravel()[order], np.arange(len(self.parents) + 1))
@@ -63,14 +64,15 @@ class FinerSkin:
             done += len(edges)
         return out
 
-    def longest_edges(self, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Longest edge at every vertex of deformed skins (G, V, 3) [m], shape (G, V).
+    @cached_property
+    def beside(self) -> tuple[Any, Any]:
+        """Neighbours of every vertex of the original skin, as Warp arrays: where those of each begin, and all of them.
 
-        It bounds the distance from a vertex to every fine point of which it is the parent.
+        A fine point is no farther from its parent than the longest edge there.
         """
-        a, b = self._edges
-        length = np.linalg.norm(vertices[:, a] - vertices[:, b], axis=2)
-        return np.asarray(np.maximum.reduceat(length, self._first_edge, axis=1), dtype=np.float64)
+        import warp as wp
+
+        return array_on("cpu", self._first_other, wp.int32), array_on("cpu", self._others, wp.int32)
 
     def faces_around(self, points: NDArray[np.integer]) -> NDArray[np.int64]:
         """Sorted indices of the triangles with a corner among ``points``."""

@@ -47,7 +47,8 @@ def _near_points(
 ) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64], NearPoints]:
     """Sample points of skins (G, n, 3); hand, row and closest point of the k of them that may touch, each (k,)."""
     points = finer.points(skins)
-    coarse = near.at_least(skins) - finer.longest_edges(skins) - _SLACK
+    # no fine point is farther from its parent than the longest edge there
+    coarse = near.at_least(skins, finer.beside) - _SLACK
     hand, row = np.nonzero((coarse <= tolerance)[:, finer.parents])
     return points, hand, row, near.near(points[hand, row], tolerance)
 

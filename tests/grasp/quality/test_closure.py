@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.grasp.quality.sets import four_on_box, ring_on_sphere
 from warpjld.errors import InputError
 from warpjld.grasp.quality import Contacts, force_closure, grasp_matrix, patch_spin, wrench_space
+from warpjld.grasp.quality.closure import closure_margins
 
 _UNIT = st.floats(-1.0, 1.0)
 
@@ -161,3 +162,15 @@ def _random(rng: np.random.Generator, count: int, friction: float) -> Contacts:
     directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     return Contacts(directions, -directions, friction)
+
+
+def test_margins_of_many_grasps_are_those_of_highs() -> None:
+    rng = np.random.default_rng(6)
+    grasps = [Contacts(np.zeros((0, 3)), np.zeros((0, 3)), 0.5), four_on_box(0.04, 0.6), ring_on_sphere(0.03, 0.0, 6)]
+    for count in rng.integers(2, 9, size=40):
+        normals = rng.normal(size=(count, 3)) + rng.uniform(0.0, 1.0) * np.array([0.0, 0.0, 1.0])
+        grasps.append(Contacts(0.03 * rng.normal(size=(count, 3)), normals, rng.uniform(0.2, 1.0), 0.003))
+    found = closure_margins(grasps, torque_scale=0.05, edges=6)
+    alone = [force_closure(one, torque_scale=0.05, edges=6).margin for one in grasps]
+    np.testing.assert_allclose(found, alone, rtol=0.0, atol=1e-9)
+    assert 10 < np.count_nonzero(found) < len(grasps)

@@ -6,6 +6,8 @@ which is the definition of the largest ball inside, without any hull.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,6 +17,8 @@ from scipy.spatial.transform import Rotation
 from tests.grasp.quality.sets import four_on_box, least_on_sphere, ring_on_sphere, two_on_sphere
 from warpjld.errors import InputError
 from warpjld.grasp.quality import Contacts, contact_wrenches, least_resistance, wrench_space
+from warpjld.grasp.quality.nearest_facet import distances_to_boundary
+from warpjld.grasp.quality.wrench_space import least_resistances
 
 _ROUNDING = 1e-9  # qhull works in float64 on numbers around 1
 _FRICTIONS = (0.2, 0.5, 0.9)
@@ -209,3 +213,27 @@ def test_a_growing_hull_of_regular_grasps() -> None:
     assert (
         least_resistance(Contacts(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)), (0, 0, 0), torque_scale=1.0) == 0.0
     )
+
+
+def test_the_growing_hull_finds_the_nearest_facet_of_the_whole_hull() -> None:
+    """Sets like those of hands, with cones of coplanar edges, and with and without force closure."""
+    rng = np.random.default_rng(4)
+    grasps = []
+    for count in rng.integers(2, 9, size=40):
+        normals = rng.normal(size=(count, 3)) + rng.uniform(0.0, 1.2) * np.array([0.0, 0.0, 1.0])
+        points = 0.03 * rng.normal(size=(count, 3))
+        grasps.append(Contacts(points, normals, rng.uniform(0.2, 1.0), rng.uniform(0.0, 0.004)))
+    grasps += [two_on_sphere(0.03, 0.5, 0.01), ring_on_sphere(0.03, 0.4, 4), four_on_box(0.04, 0.6)]
+    found = least_resistances(grasps, (0.0, 0.0, 0.0), torque_scale=0.05)
+    whole = [wrench_space(one, (0.0, 0.0, 0.0), torque_scale=0.05).epsilon for one in grasps]
+    np.testing.assert_allclose(found, whole, rtol=0.0, atol=_ROUNDING)
+    assert 10 < np.count_nonzero(found) < len(grasps)
+
+
+def test_points_on_one_facet_are_no_reason_for_doubt() -> None:
+    """A cube's facets hold half of its corners each; the kernel decides alone, and of a shifted cube, too."""
+    corners = np.array(list(product((-1.0, 1.0), repeat=6)))
+    shifted = corners + np.array([0.4, 0.0, 0.0, -0.2, 0.0, 0.0])
+    outside = corners + np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # the origin on a facet
+    distances = distances_to_boundary([np.concatenate([np.zeros((1, 6)), p]) for p in (corners, shifted, outside)])
+    assert distances == pytest.approx([1.0, 0.6, 0.0], abs=1e-12)

@@ -57,7 +57,9 @@ def distances_to_boundary(hulls: Sequence[Array]) -> list[float | None]:
     given = [wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in arrays]
     wp.launch(wrench_hull.nearest_facets, rows, inputs=given[:8], outputs=given[8:], device="cpu")
     near = normals.reshape(rows, wrench_hull.NEAREST, 6)
-    return [_exact(own, float(size), near[k, : found[k]]) for k, (own, size) in enumerate(zip(hulls, sizes, strict=True))]
+    return [
+        _exact(own, float(size), near[k, : found[k]]) for k, (own, size) in enumerate(zip(hulls, sizes, strict=True))
+    ]
 
 
 def _exact(points: Array, size: float, normals: Array) -> float | None:
