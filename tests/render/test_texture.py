@@ -11,9 +11,10 @@ import trimesh
 from PIL import Image
 
 from warpjld.errors import InputError
-from warpjld.geometry.paint import SurfacePaint, paint_of_surface
+from warpjld.geometry.paint import SurfacePaint, paint_by_parts, paint_of_surface
 from warpjld.geometry.surface import Part, weld_surface
 from warpjld.grasp import load_object
+from warpjld.io.mesh_file import read_mesh
 from warpjld.render import Camera, Quality, SceneRenderer, Solid
 from warpjld.render.texture import texture_atlas
 from warpjld.script import Interpreter, Scene
@@ -117,6 +118,34 @@ def test_an_atlas_holds_what_its_tiles_hold() -> None:
     assert (colors[2] == [4, 5, 6]).all()
     assert colors[1].tolist() == [list(RED), list(RED), list(BLUE)]
     assert texture_atlas([(None, 1, (1, 2, 3))]) is None
+
+
+def test_several_materials_of_an_obj_file(tmp_path: Path) -> None:
+    """Two squares, red and blue by their own pictures, and one without."""
+    lines = ["mtllib two.mtl"]
+    for k, material in enumerate(("warm coat", "cold", "bare")):
+        lines += [f"v {k + x} {y} 0" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        lines += ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1", f"usemtl {material}"]
+        lines.append("f " + " ".join(f"{4 * k + i}/{4 * k + i}" for i in (1, 2, 3, 4)))
+    (tmp_path / "two.obj").write_text("\n".join(lines))
+    (tmp_path / "two.mtl").write_text("newmtl warm coat\nmap_Kd red.png\nnewmtl cold\nmap_Kd blue.png\nnewmtl bare\n")
+    for name, color in (("red", RED), ("blue", BLUE)):
+        Image.new("RGB", (4, 4), color).save(tmp_path / f"{name}.png")
+    mesh = read_mesh(tmp_path / "two.obj")
+    assert mesh.notes == ()
+    paint = paint_by_parts(mesh.corner_uv if mesh.uv is None else mesh.uv[mesh.faces], mesh.parts, len(mesh.faces))
+    assert paint is not None
+    assert paint.image.tolist() == [0, 0, 1, 1, -1, -1]
+    found = texture_atlas([(paint, 6, (1, 2, 3))])
+    assert found is not None
+    height, width = found.image.shape[:2]
+    middle = found.corner_uv.mean(axis=1)
+    colors = found.image[((1.0 - middle[:, 1]) * height).astype(int), (middle[:, 0] * width).astype(int)]
+    assert colors.tolist() == [list(RED)] * 2 + [list(BLUE)] * 2 + [[1, 2, 3]] * 2
+    (tmp_path / "blue.png").unlink()  # the other is drawn all the same
+    mesh = read_mesh(tmp_path / "two.obj")
+    assert "its texture is not drawn" in mesh.notes[0]
+    assert len(mesh.parts[0].painted) == 1
 
 
 def test_what_is_not_there_or_no_picture(tmp_path: Path) -> None:

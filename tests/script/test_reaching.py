@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
+from warpjld.geometry.winding import winding_numbers
 from warpjld.grasp.palm import palm_of
 from warpjld.io import load_rig
 from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.binding import cover
+from warpjld.script.grasping import Attempt
 from warpjld.script.staging import stage
+from warpjld.skeleton import DIGITS
+from warpjld.skeleton.arm import arm_of
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +108,72 @@ def test_a_thigh_behind_the_palm_is_no_palm(figure: Rig) -> None:
     palm = palm_of(figure.skeleton, "left")
     middle = palm.on_skin(figure.surface.vertices).middle
     assert np.linalg.norm(middle - palm.middle) < 0.03
+
+
+def test_a_place_inside_the_body_is_not_entered(anny: Scene) -> None:
+    """In the thigh: the hand stays outside, and it is said how far away."""
+    scene = _fresh(anny)
+    scene.warn = lambda text: None
+    hip, knee = (scene.actor().skeleton.rest[scene.actor().skeleton.index(f"left.{j}")] for j in ("hip", "knee"))
+    x, y, z = 0.8 * hip + 0.2 * knee
+    Interpreter(scene).run_text(f"REACH 0 20 LEFT AT {x} {y} {z}")
+    (attempt,) = scene.attempts
+    assert attempt.status == "SHORT"
+    assert "20" not in attempt.values["pierced_faces"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", ["LEFT", "RIGHT"])
+def test_targets_around_a_body(anny: Scene, side: str) -> None:
+    """20 targets at five heights from shoulder to knee, four around the body: reached to 2 mm, or named with how far
+    they are out of reach; in either case inside the limits, with still feet, and no part of the arm in the trunk."""
+    skeleton = anny.actor().skeleton
+    rest = dict(zip(skeleton.names, skeleton.rest, strict=True))
+    sign = 1.0 if side == "LEFT" else -1.0
+    half = np.linalg.norm(rest["left.shoulder"] - rest["right.shoulder"]) / 2.0
+    middle = (rest["left.hip"] + rest["right.hip"]) / 2.0
+    shoulder, hip, knee = (rest[f"left.{joint}"][1] for joint in ("shoulder", "hip", "knee"))
+    heights = (shoulder, (shoulder + hip) / 2, hip, (hip + knee) / 2, knee)
+    around = ((-0.8, 1.1), (0.5, 1.1), (1.6, 0.3), (0.7, -1.1))  # outwards and forward, in half widths of the shoulders
+    reached = 0
+    for height in heights:
+        for out, ahead in around:
+            scene = _fresh(anny)
+            place = np.array([middle[0] + sign * half * out, height, middle[2] + half * ahead])
+            Interpreter(scene).run_text(f"REACH 0 20 {side} AT {' '.join(f'{x:.6f}' for x in place)}")
+            (attempt,) = scene.attempts
+            check_reach(scene, side.lower(), place, attempt)
+            reached += attempt.status == "CONVERGED"
+    assert reached >= 12  # what hangs below the hips is out of reach of an upright body
+
+
+def check_reach(scene: Scene, side: str, place: np.ndarray, attempt: Attempt) -> None:
+    actor = scene.actor()
+    covering, arm = cover(actor), arm_of(actor.skeleton, side)
+    rest, poses = (stage(actor, np.array([frame]), scene.rate) for frame in (0.0, 20.0))
+    skin = covering.deform(poses)[0].astype(np.float64)
+    assert attempt.status in ("CONVERGED", "SHORT"), attempt.message
+    if attempt.status == "CONVERGED":
+        assert np.linalg.norm(skin - place, axis=1).min() < 2e-3
+    else:
+        assert "out of reach" in attempt.message
+        assert attempt.values["short_mm"] > 2.0
+    values = arm.values(actor.motion.sample(np.array([20.0]), actor.skeleton)[0][0])
+    assert (values >= arm.limits[:, 0] - 1e-6).all()
+    assert (values <= arm.limits[:, 1] + 1e-6).all()
+    for joint in ("pelvis", "left.ankle", "right.ankle"):
+        k = actor.skeleton.index(joint)
+        np.testing.assert_allclose(poses.positions[0, k], rest.positions[0, k], atol=1e-12)
+    # by the winding number, not by the spheres that the search goes by
+    faces = actor.rig.surface.faces
+    anchors, names = covering.anchors, actor.skeleton.names
+    strongest = anchors.segment[np.arange(len(anchors)), anchors.weight.argmax(axis=1)]
+    ends = np.array([names[j] for j in anchors.ends[strongest, 0]])
+    hand = tuple(f"{side}.{part}" for part in ("elbow", "wrist", *DIGITS))
+    below = np.array([name.startswith(hand) for name in ends])
+    whole = below | np.array([name == f"{side}.shoulder" for name in ends])
+    trunk = faces[~whole[faces].any(axis=1)]
+    assert not (winding_numbers(skin, trunk, skin[below]) > 0.5).any()
 
 
 @pytest.mark.slow

@@ -129,6 +129,32 @@ def test_a_body_that_stands_elsewhere_reaches_the_same_place_beside_it() -> None
     np.testing.assert_allclose(there.angles, here.angles, atol=1e-5)
 
 
+def test_a_search_goes_on_from_a_posture_close_by() -> None:
+    skeleton = body()
+    arm, angles = arm_of(skeleton, "left"), np.zeros((len(skeleton), 4))
+    place = np.array([0.35, 1.1, 0.25])
+    first = reach(arm, angles, rest_poses(skeleton), Target(place, np.zeros(3)))
+    near = Target(place + np.array([0.0, 0.004, 0.0]), np.zeros(3))
+    found = reach(arm, angles, rest_poses(skeleton), near, start=arm.values(first.angles))
+    assert found.short < 1e-5
+    np.testing.assert_allclose(found.angles, first.angles, atol=0.1)
+
+
+def test_what_must_not_be_entered_comes_before_the_target_if_so_asked() -> None:
+    """A target 5 cm inside the wall beyond z = .2."""
+    skeleton = body()
+    arm, angles = arm_of(skeleton, "left"), np.zeros((len(skeleton), 4))
+
+    def depths(positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        return np.maximum(positions[:, [arm.wrist], 2] - 0.2, 0.0)
+
+    target = Target(np.array([0.35, 1.1, 0.25]), np.zeros(3))
+    inside = reach(arm, angles, rest_poses(skeleton), target, depths=depths)
+    beside = reach(arm, angles, rest_poses(skeleton), target, depths=depths, firm=True)
+    assert inside.short < 1e-3
+    assert beside.short == pytest.approx(0.05, abs=2e-4)
+
+
 def test_an_arm_in_a_wall_is_taken_out_of_it() -> None:
     """The wall: everything behind z = .1."""
     skeleton = body()

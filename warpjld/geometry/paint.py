@@ -38,10 +38,11 @@ def paint_by_parts(corner_uv: NDArray[np.float32] | None, parts: tuple[Part, ...
     images: list[bytes] = []
     image = np.full(count, -1, np.int32)
     for part in parts:
-        if part.texture is not None:
-            if part.texture not in images:
-                images.append(part.texture)
-            image[part.faces] = images.index(part.texture)
+        whole = () if part.texture is None else ((part.faces, part.texture),)
+        for faces, texture in (*whole, *part.painted):
+            if texture not in images:
+                images.append(texture)
+            image[faces] = images.index(texture)
     if corner_uv is None or not images:
         return None
     return SurfacePaint(np.asarray(corner_uv, np.float32), image, tuple(images))

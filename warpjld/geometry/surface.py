@@ -21,12 +21,13 @@ _SEAM = 1e-6  # relative to the surface's size: border vertices of two parts nea
 @dataclass(frozen=True)
 class Part:
     """One mesh of the source file: ranges of source vertices and source faces, and its base colour texture, as an
-    encoded image."""
+    encoded image; ``painted``: ranges of its source faces with their own textures, where it has several."""
 
     name: str
     vertices: slice
     faces: slice
     texture: bytes | None = field(default=None, repr=False)
+    painted: tuple[tuple[slice, bytes], ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True, eq=False)

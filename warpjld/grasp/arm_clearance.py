@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,13 +12,15 @@ from warpjld.covering import Covering
 from warpjld.covering.intersections import crossing_faces
 from warpjld.geometry.rotations import rotate
 from warpjld.grasp.palm import palm_of
-from warpjld.skeleton import Poses
+from warpjld.skeleton import Poses, Skeleton
 from warpjld.skeleton.arm import Arm
+from warpjld.skeleton.hand import DIGITS
 
 __all__ = ["ArmClearance", "pierced_faces"]
 
-_UPPER, _FORE, _HAND = (0.6, 0.75, 0.9), (0.0, 0.2, 0.4, 0.6, 0.8), (0.0, 0.5, 1.0)
-"""Places of the spheres along the upper arm, the forearm, and the line from wrist to palm, as fractions of each.
+_UPPER, _FORE, _HAND, _DIGIT = (0.6, 0.75, 0.9), (0.0, 0.2, 0.4, 0.6, 0.8), (0.0, 0.5, 1.0), (0.0, 0.5, 1.0)
+"""Places of the spheres along the upper arm, the forearm, the line from wrist to palm, and the line from a digit's
+second joint to its tip, as fractions of each.
 
 The upper arm's first half merges with the trunk and has none.
 """
@@ -23,6 +28,11 @@ _SPACING = 0.015
 """Longest edge of the triangles whose centres sample the skin [m]."""
 _BESIDE = 0.15
 """Half-width of the window around a sphere, as a fraction of the bone, whose skin determines the sphere's radius."""
+_Line = tuple[NDArray[np.float64], NDArray[np.float64], tuple[float, ...]]
+"""Ends of a line [m] and places on it, as fractions of its length."""
+_FAR = 0.2
+"""Distance from the skin beyond which a sphere is not inside [m]: nothing in a body is as deep. Searches for the
+nearest point of the skin end there."""
 _SHOULDER = 2.5
 """Distance from the shoulder, in radii of the upper arm, within which skin belongs to both arm and trunk: ignored."""
 
@@ -44,9 +54,17 @@ class ArmClearance:
 
         self._arm = arm
         side = arm.skeleton.names[arm.joints[-1]].partition(".")[0]
-        self._hand = palm_of(arm.skeleton, side).middle - arm.skeleton.rest[arm.joints[-1]]
         self.own = _own_vertices(covering, arm)
-        self._radii = self._thickness(covering)
+        wrist, rest, posed = arm.joints[-1], arm.skeleton.rest, body.positions[0]
+        palm, ends = palm_of(arm.skeleton, side).middle, _digits(arm.skeleton, side)
+        lines = [(rest[wrist], palm, _HAND)] + [(rest[a], rest[b], _DIGIT) for a, b in ends]
+        self._radii = self._thickness(covering, lines)
+        # the hand's own angles do not change: its spheres are constant in the wrist's axes
+        along = [np.outer(_HAND, palm - rest[wrist])]
+        for a, b in ends:
+            first, last = arm.carried(posed[a], body), arm.carried(posed[b], body)
+            along.append(first + np.outer(_DIGIT, last - first))
+        self._hand = np.concatenate(along)
         vertices = np.asarray(covering.deform(body)[0], dtype=np.float64)
         faces = covering.surface.faces
         faces = faces[~self.own[faces].any(axis=1)]
@@ -69,26 +87,34 @@ class ArmClearance:
             rotations: Their rotations from rest, quaternions x, y, z, w, shape (B, chain, 4).
         """
         points = self._samples(positions, rotations)
-        _, near = self._tree.query(points)
-        away = points - self._middles[near]
-        height = (away * self._normals[near]).sum(axis=-1)
-        distance = np.where(height < 0.0, -1.0, 1.0) * np.linalg.norm(away, axis=-1)
-        return np.asarray(np.maximum(self._radii - distance, 0.0))
+        away, near = self._tree.query(points, distance_upper_bound=_FAR)
+        found = np.isfinite(away)
+        nearest = near[found]
+        height = ((points[found] - self._middles[nearest]) * self._normals[nearest]).sum(axis=-1)
+        away[found] *= np.where(height < 0.0, -1.0, 1.0)
+        return np.asarray(np.maximum(self._radii - away, 0.0))
+
+    def wider(self, by: float) -> ArmClearance:
+        """The same with spheres larger by a margin [m]."""
+        out = copy(self)
+        out._radii = self._radii + by
+        return out
 
     def _samples(self, positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
         arm = self._arm
         shoulder, elbow, wrist = (positions[:, k] for k in (arm.shoulder, arm.elbow, arm.wrist))
-        hand = wrist + rotate(rotations[:, arm.wrist], self._hand)
-        lines = ((shoulder, elbow, _UPPER), (elbow, wrist, _FORE), (wrist, hand, _HAND))
-        return np.stack([a + share * (b - a) for a, b, shares in lines for share in shares], axis=1)
+        lines = ((shoulder, elbow, _UPPER), (elbow, wrist, _FORE))
+        bones = np.stack([a + share * (b - a) for a, b, shares in lines for share in shares], axis=1)
+        hand = wrist[:, None] + rotate(rotations[:, arm.wrist, None], self._hand[None])
+        return np.concatenate([bones, hand], axis=1)
 
-    def _thickness(self, covering: Covering) -> NDArray[np.float64]:
+    def _thickness(self, covering: Covering, hand: Sequence[_Line]) -> NDArray[np.float64]:
         """Radius of the arm at every sphere at rest [m]."""
         arm, rest = self._arm, self._arm.skeleton.rest
         shoulder, elbow, wrist = (rest[arm.joints[k]] for k in (arm.shoulder, arm.elbow, arm.wrist))
         skin = covering.surface.vertices[self.own]
         out = []
-        for a, b, shares in ((shoulder, elbow, _UPPER), (elbow, wrist, _FORE), (wrist, wrist + self._hand, _HAND)):
+        for a, b, shares in ((shoulder, elbow, _UPPER), (elbow, wrist, _FORE), *hand):
             along = b - a
             share = (skin - a) @ along / (along @ along)
             away = np.linalg.norm(skin - a - share[:, None] * along, axis=1)
@@ -114,6 +140,13 @@ def pierced_faces(covering: Covering, arm: Arm, skin: NDArray[np.floating]) -> N
     pairs = crossing_faces(skin, faces).pairs
     other = pairs[below[pairs[:, 0]] & rest[pairs[:, 1]]][:, 1], pairs[below[pairs[:, 1]] & rest[pairs[:, 0]]][:, 0]
     return np.unique(np.concatenate(other))
+
+
+def _digits(skeleton: Skeleton, side: str) -> list[tuple[int, int]]:
+    """Second joint and tip of each digit of a hand, as numbers of joints."""
+    names = {name: k for k, name in enumerate(skeleton.names)}
+    pairs = [(f"{side}.{digit}.knuckle2", f"{side}.{digit}.tip") for digit in DIGITS]
+    return [(names[a], names[b]) for a, b in pairs if a in names and b in names]
 
 
 def _own_vertices(covering: Covering, arm: Arm, *, whole: bool = True) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from warpjld.files.input_file import check_input
 from warpjld.files.reading import reading
 from warpjld.geometry.surface import Part, one_uv_a_vertex
 from warpjld.io.obj_file import read_obj
-from warpjld.io.obj_material import obj_texture
+from warpjld.io.obj_material import obj_textures
 from warpjld.io.off_file import read_off
 from warpjld.io.ply_file import PlyFile, read_ply
 from warpjld.io.polygons import triangulate_polygons
@@ -77,10 +77,23 @@ def read_mesh(path: str | Path) -> MeshFile:
 def _obj(path: Path) -> MeshFile:
     file = read_obj(path)
     uv, corner_uv = one_uv_a_vertex(len(file.vertices), file.faces, file.corner_uv)
-    picture, note = obj_texture(path) if file.corner_uv is not None else (None, "")
-    parts = tuple(replace(part, texture=picture) for part in file.parts)
+    used = [name for name, _ in file.materials] if file.corner_uv is not None else []
+    pictures, note = obj_textures(path.parent, file.libraries if used else (), used)
+    parts = tuple(replace(part, painted=_painted(part, file.materials, pictures)) for part in file.parts)
     notes = (*file.notes, *([note] if note else []))
     return MeshFile(path, file.vertices, file.faces, uv, corner_uv, parts, notes, file.polygons)
+
+
+def _painted(
+    part: Part, materials: tuple[tuple[str, slice], ...], pictures: Mapping[str, bytes]
+) -> tuple[tuple[slice, bytes], ...]:
+    """Textures of a part's triangles, by ranges; ``pictures`` by the names of materials."""
+    out = []
+    for name, run in materials:
+        both = slice(max(run.start, part.faces.start), min(run.stop, part.faces.stop))
+        if name in pictures and both.stop > both.start:
+            out.append((both, pictures[name]))
+    return tuple(out)
 
 
 def _gltf(path: Path) -> MeshFile:

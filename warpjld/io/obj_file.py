@@ -39,6 +39,8 @@ class ObjFile:
         parts: The file's objects (``o``) if each has a contiguous range of vertices, else the file as a whole.
         notes: Repairs, for the user.
         polygons: Face of the file that each triangle is part of, counted from 0, shape (S,).
+        libraries: Names of its material libraries.
+        materials: Names of materials (empty: none) and the triangles that have them, in order.
     """
 
     vertices: NDArray[np.float64]
@@ -47,6 +49,8 @@ class ObjFile:
     parts: tuple[Part, ...]
     notes: tuple[str, ...]
     polygons: NDArray[np.int64]
+    libraries: tuple[str, ...] = ()
+    materials: tuple[tuple[str, slice], ...] = ()
 
 
 @dataclass
@@ -62,10 +66,12 @@ class _Lines:
     counts: list[int] = field(default_factory=list)
     face_lines: list[int] = field(default_factory=list)
     objects: list[tuple[str, int]] = field(default_factory=list)
+    libraries: list[str] = field(default_factory=list)
+    materials: list[tuple[str, int]] = field(default_factory=list)
 
 
 def read_obj(path: str | Path) -> ObjFile:
-    """Read the polygons of an OBJ file; lines, curves, normals and materials are ignored.
+    """Read the polygons of an OBJ file; lines, curves and normals are ignored.
 
     Numbers may be separated by blanks or tabs, a backslash continues lines, comments may follow anything, and the file
     may start with a byte order mark. Indices count from one, negative ones backwards from the last vertex so far.
@@ -90,7 +96,8 @@ def read_obj(path: str | Path) -> ObjFile:
     if len(parts) < 2:
         name = parts[0].name if parts else ""
         parts = (Part(name or path.stem, slice(0, len(vertices)), slice(0, len(faces))),)
-    return ObjFile(vertices, faces, corner_uv, parts, tuple(notes), polygon)
+    materials = _runs(lines.materials, len(faces), polygon)
+    return ObjFile(vertices, faces, corner_uv, parts, tuple(notes), polygon, tuple(lines.libraries), materials)
 
 
 def _split(text: str, path: Path) -> _Lines:
@@ -116,8 +123,24 @@ def _split(text: str, path: Path) -> _Lines:
             case "f" | "fo":
                 _add_face(out, words[1:], first, path)
             case "o":
-                out.objects.append((line.split(None, 1)[1].strip() if len(words) > 1 else "", len(out.counts)))
+                out.objects.append((_rest(line), len(out.counts)))
+            case "mtllib":
+                out.libraries.append(_rest(line))
+            case "usemtl":
+                out.materials.append((_rest(line), len(out.counts)))
     return out
+
+
+def _rest(line: str) -> str:
+    """What follows a line's keyword."""
+    return "".join(line.split(None, 1)[1:]).strip()
+
+
+def _runs(begins: list[tuple[str, int]], count: int, polygon: NDArray[np.int64]) -> tuple[tuple[str, slice], ...]:
+    """Names and the ranges of the ``count`` triangles that they hold for; ``begins``: names and their first faces."""
+    names = ["", *(name for name, _ in begins)]
+    bounds = [0, *(int(np.searchsorted(polygon, start)) for _, start in begins), count]
+    return tuple((name, slice(a, b)) for name, a, b in zip(names, bounds, bounds[1:], strict=False) if b > a)
 
 
 def _add_face(out: _Lines, words: list[str], line: int, path: Path) -> None:
@@ -186,15 +209,11 @@ def _parts(
     objects: list[tuple[str, int]], count: int, faces: NDArray[np.int64], polygon: NDArray[np.int64]
 ) -> tuple[Part, ...]:
     """One part per object; none if objects share vertices, or use them in another order."""
-    names = ["", *(name for name, _ in objects)]
-    bounds = [0, *(int(np.searchsorted(polygon, start)) for _, start in objects), len(faces)]
-    filled = [i for i in range(len(names)) if bounds[i + 1] > bounds[i]]
-    runs = [slice(bounds[i], bounds[i + 1]) for i in filled]
+    found = _runs(objects, len(faces), polygon)
+    runs = [run for _, run in found]
     lows = [int(faces[run].min()) for run in runs]
     highs = [int(faces[run].max()) for run in runs]
     if any(high >= low for high, low in zip(highs, lows[1:], strict=False)):
         return ()
     ends = [0, *lows[1:], count]  # unused vertices belong to the object before them
-    return tuple(
-        Part(names[i], slice(ends[k], ends[k + 1]), run) for k, (i, run) in enumerate(zip(filled, runs, strict=True))
-    )
+    return tuple(Part(name, slice(ends[k], ends[k + 1]), run) for k, (name, run) in enumerate(found))

@@ -1,40 +1,43 @@
-"""Base colour texture of an OBJ file, found by its material library (MTL)."""
+"""Base colour textures of an OBJ file, found by its material libraries (MTL)."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from warpjld.errors import InputError
 from warpjld.files.input_file import read_bytes
 from warpjld.io.gltf.schema import inside_folder
 
-__all__ = ["obj_texture"]
+__all__ = ["obj_textures"]
 
 
-def obj_texture(path: Path) -> tuple[bytes | None, str]:
-    """Encoded image of the single texture (``map_Kd``) of an OBJ file, and a warning.
+def obj_textures(folder: Path, libraries: Sequence[str], used: Collection[str]) -> tuple[dict[str, bytes], str]:
+    """Encoded images of the textures (``map_Kd``) of an OBJ file's materials, and a warning.
 
-    The image is None if the file has several materials or if its material library or texture is missing. The warning is
-    empty if there is nothing to report.
+    Args:
+        folder: Folder of the file.
+        libraries: Names of its material libraries.
+        used: Names of the materials that its faces have.
+
+    Returns:
+        Images by the material's name, of materials that have a texture that can be read, and what could not be read,
+        empty if there is nothing to report.
     """
-    libraries, used = [], set()
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            word, _, rest = line.partition(" ")
-            if word == "mtllib":
-                libraries.append(rest.strip())
-            elif word == "usemtl":
-                used.add(rest.strip())
     pictures: dict[str, str] = {}
-    try:
-        for library in libraries:
-            pictures |= _pictures(path.parent / inside_folder(library))
-        wanted = {pictures[name] for name in used if name in pictures}
-        if len(wanted) == 1 and len(used) == 1:
-            return read_bytes(path.parent / inside_folder(wanted.pop())), ""
-    except (InputError, OSError) as error:
-        return None, f"its texture is not drawn: {error}"
-    return None, "its textures are not drawn: it has several materials" if wanted else ""
+    images: dict[str, bytes] = {}
+    wrong = ""
+    for library in libraries:
+        try:
+            pictures |= _pictures(folder / inside_folder(library))
+        except (InputError, OSError) as error:
+            wrong = wrong or f"its texture is not drawn: {error}"
+    for name in sorted(set(used) & pictures.keys()):
+        try:
+            images[name] = read_bytes(folder / inside_folder(pictures[name]))
+        except (InputError, OSError) as error:
+            wrong = wrong or f"its texture is not drawn: {error}"
+    return images, wrong
 
 
 def _pictures(library: Path) -> dict[str, str]:

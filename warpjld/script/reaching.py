@@ -29,6 +29,11 @@ REACHED = 0.002
 """Distance up to which a goal counts as reached [m]."""
 _ROUNDS = 4  # largest number of solutions; each uses the skin's offset from the previous one
 _SETTLED = 2e-4  # change of the skin's offset from the wrist at which the iteration ends [m]
+_MARGINS = (0.0, 0.01, 0.02)
+"""Added to the radii of the arm's spheres [m] in searches that put the body's skin before the target, one after another
+as long as the arm's skin passes through it: spheres have the arm's thin side."""
+_WAY_KEYS = 3  # largest number of keys that are set on the way to keep the arm out of the body
+_WAY_MARGIN = 0.01  # added to the radii there, since splines swing past their keys [m]
 _LOOKS = 7  # frames of the motion at which intersections of the arm with the body are looked for
 
 
@@ -59,24 +64,22 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     """
     from warpjld.grasp.arm_clearance import ArmClearance
     from warpjld.skeleton.arm import arm_of
-    from warpjld.skeleton.reach import clear
 
     arm = arm_of(actor.skeleton, side)
     covering = cover(actor)
     poses, angles = posture(scene, actor, last)
     clearance = ArmClearance(covering, arm, poses)
-    found, at = _solved(scene, actor, covering, arm, poses, angles[0], last, goal, clearance)
     _, before = posture(scene, actor, first)
     key_arm(scene, actor, arm, first, arm.values(before[0]))
-    key_arm(scene, actor, arm, last, arm.values(found.angles))
-    short = float(np.linalg.norm(at - goal.place))
-    pierced = pierced_frames(scene, actor, covering, arm, first, last)
-    if _on_the_way(pierced, last):
-        # a key half-way moves the arm out of the body
-        middle = 0.5 * (first + last)
-        poses, angles = posture(scene, actor, middle)
-        key_arm(scene, actor, arm, middle, clear(arm, angles[0], poses, arm.values(angles[0]), clearance))
+    for margin in (None, *_MARGINS):
+        room = clearance if margin is None else clearance.wider(margin)
+        found, at = _solved(scene, actor, covering, arm, poses, angles[0], last, goal, room, margin is not None)
+        key_arm(scene, actor, arm, last, arm.values(found.angles))
         pierced = pierced_frames(scene, actor, covering, arm, first, last)
+        if not pierced[last]:
+            break
+    pierced = _cleared_way(scene, actor, arm, first, last, pierced)
+    short = float(np.linalg.norm(at - goal.place))
     status = "CONVERGED" if short <= REACHED else "SHORT"
     if pierced[last]:
         status = "PIERCES"
@@ -89,6 +92,29 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     if status != "CONVERGED":
         scene.warned([f"{actor.name}: REACH {goal.name} at frame {last:g}: {message}"])
     return Attempt(f"REACH {goal.name}", last, actor.name, goal.object, status, message, values)
+
+
+def _cleared_way(
+    scene: Scene, actor: Actor, arm: Arm, first: float, last: float, pierced: dict[float, int]
+) -> dict[float, int]:
+    """Set keys between two frames at which the arm would pass through the body, until it does not or none helps.
+
+    Returns:
+        Faces that are passed through, by frame, as of ``pierced_frames``.
+    """
+    from warpjld.grasp.arm_clearance import ArmClearance
+    from warpjld.skeleton.reach import clear
+
+    covering = cover(actor)
+    keyed: set[float] = set()
+    while (way := [f for f in _on_the_way(pierced, last) if f not in (first, *keyed)]) and len(keyed) < _WAY_KEYS:
+        worst = max(way, key=lambda frame: pierced[frame])
+        poses, angles = posture(scene, actor, worst)
+        depths = ArmClearance(covering, arm, poses).wider(_WAY_MARGIN)
+        key_arm(scene, actor, arm, worst, clear(arm, angles[0], poses, arm.values(angles[0]), depths))
+        keyed.add(worst)
+        pierced = pierced_frames(scene, actor, covering, arm, first, last)
+    return pierced
 
 
 def key_arm(scene: Scene, actor: Actor, arm: Arm, frame: float, values: NDArray[np.float64]) -> None:
@@ -170,6 +196,7 @@ def _solved(
     key: float,
     goal: Goal,
     clearance: ArmClearance,
+    firm: bool,
 ) -> tuple[Reached, NDArray[np.float64]]:
     """Posture of the arm, and the position that the part of the hand then has [m], shape (3,).
 
@@ -194,10 +221,11 @@ def _solved(
         return np.asarray(covering.points(body, [vertex])[0, 0], dtype=np.float64)
 
     _, root = actor.motion.sample(np.array([key]), actor.skeleton)
-    body, offset = poses, arm.carried(part_of(poses), poses)
+    body, offset, near = poses, arm.carried(part_of(poses), poses), None
     for _ in range(_ROUNDS):
         target = Target(goal.place, offset, () if goal.look is None else ((palm.normal, goal.look),))
-        found = reach(arm, angles, poses, target, depths=clearance)
+        found = reach(arm, angles, poses, target, depths=clearance, start=near, firm=firm)
+        near = arm.values(found.angles)
         body = actor.placement.apply(
             poses_from_angles(arm.skeleton, found.angles[None], root_position=root), np.array([key])
         )

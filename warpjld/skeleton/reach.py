@@ -31,6 +31,9 @@ _SAMPLES = 512
 """Postures sampled as candidates for starts."""
 _STARTS = 5
 """Best samples from which the search is started."""
+_KEPT = 2
+"""Of these as many are solved to the end: comfort, by which they are ranked, hardly changes then."""
+_FIRST, _LAST = 50, 100  # largest numbers of evaluations of the first and the last solve
 _STEP = 1e-6  # of central differences [rad]
 _DISTANCE_WEIGHTS = (20.0, 1000.0)
 """Weights of the distance to the target over the arm's length, of the first and the last solve: the first settles the
@@ -40,6 +43,9 @@ _PREFERRED = 2.0
 positions do."""
 _PRESCRIBED = 5.0  # weight of prescribed directions in the first solve; scaled as that of the distance in the last
 _PENETRATION = 50.0  # weight of penetration depths, over the arm's length
+_FIRM = 20.0
+"""Weight of penetration depths per weight of the distance, where they come first: of what the target is missed by, a
+400th part enters the body."""
 # weights of discomfort, over half of the clinical range of motion
 _DISCOMFORT = {
     ("wrist", "flexion"): 0.5 / np.radians(75.0),
@@ -91,7 +97,14 @@ class Reached:
 
 
 def reach(
-    arm: Arm, angles: NDArray[np.float64], body: Poses, target: Target, *, depths: Depths | None = None
+    arm: Arm,
+    angles: NDArray[np.float64],
+    body: Poses,
+    target: Target,
+    *,
+    depths: Depths | None = None,
+    start: NDArray[np.float64] | None = None,
+    firm: bool = False,
 ) -> Reached:
     """The most comfortable posture of an arm that comes nearest to a target.
 
@@ -101,31 +114,32 @@ def reach(
         body: Pose of these angles in the scene, one frame.
         target: Target in the scene's frame.
         depths: Penetration depths of samples of the arm in what it must not enter.
+        start: Angles of the arm near the solution, as of a target close by [rad], shape (n,); by default the search is
+            started from several samples of the arm's range.
+        firm: Whether not to penetrate the body comes before the target; otherwise the target comes first.
     """
     from scipy.optimize import least_squares
 
-    costs = _Residuals(arm, angles, body, target, depths)
+    costs = _Residuals(arm, angles, body, target, depths, firm)
     low, high = arm.limits.T
-    best: NDArray[np.float64] | None = None
-    least = np.inf
-    for start in costs.starts():
+
+    def solved(first: NDArray[np.float64], near: float, most: int) -> tuple[float, NDArray[np.float64]]:
         # strictly inside the bounds, as least_squares requires
-        found = np.clip(start, low + 1e-9, high - 1e-9)
-        for near in _DISTANCE_WEIGHTS:
-            solved = least_squares(
-                lambda x, near=near: costs(x[None], near)[0],
-                found,
-                jac=lambda x, near=near: _jacobian(lambda postures: costs(postures, near), x),
-                bounds=(low, high),
-                xtol=1e-10,
-                ftol=1e-10,
-                gtol=1e-10,
-                max_nfev=100,
-            )
-            found = np.clip(solved.x, low + 1e-9, high - 1e-9)
-        if solved.cost < least:
-            least, best = float(solved.cost), np.asarray(solved.x)
-    assert best is not None
+        found = least_squares(
+            lambda x: costs(x[None], near)[0],
+            np.clip(first, low + 1e-9, high - 1e-9),
+            jac=lambda x: _jacobian(lambda postures: costs(postures, near), x),
+            bounds=(low, high),
+            xtol=1e-10,
+            ftol=1e-10,
+            gtol=1e-10,
+            max_nfev=most,
+        )
+        return float(found.cost), np.asarray(found.x)
+
+    starts = costs.starts() if start is None else start[None]
+    settled = sorted((solved(first, _DISTANCE_WEIGHTS[0], _FIRST) for first in starts), key=lambda one: one[0])
+    _, best = min((solved(x, _DISTANCE_WEIGHTS[1], _LAST) for _, x in settled[:_KEPT]), key=lambda one: one[0])
     return costs.reached(best)
 
 
@@ -160,9 +174,16 @@ class _Residuals:
     """Residuals of postures; arguments as of ``reach``."""
 
     def __init__(
-        self, arm: Arm, angles: NDArray[np.float64], body: Poses, target: Target, depths: Depths | None
+        self,
+        arm: Arm,
+        angles: NDArray[np.float64],
+        body: Poses,
+        target: Target,
+        depths: Depths | None,
+        firm: bool,
     ) -> None:
         self._arm, self._angles, self._body, self._target, self._depths = arm, angles, body, target, depths
+        self._firm = firm
         names = [arm.skeleton.names[j].rpartition(".")[2] for j in arm.joints]
         words = [(names[k], CHANNELS[column]) for k, column in arm.free.tolist()]
         self._weights = np.array([_DISCOMFORT.get(word, 0.0) for word in words])
@@ -181,7 +202,8 @@ class _Residuals:
         weight = near / _DISTANCE_WEIGHTS[0] * _PRESCRIBED if target.exact else _PREFERRED
         out += [weight * (rotate(rotations[:, -1], own) - wanted) for own, wanted in target.aims]
         if self._depths is not None:
-            out.append(_PENETRATION * self._depths(positions, rotations) / arm.length)
+            weight = _FIRM * near if self._firm else _PENETRATION
+            out.append(weight * self._depths(positions, rotations) / arm.length)
         return np.concatenate(out, axis=1)
 
     def starts(self) -> NDArray[np.float64]:

@@ -44,6 +44,24 @@ def test_points_turn_and_scale_with_the_surface(figure, placed):
         np.testing.assert_allclose(moved[name], 100.0 * turn @ place + 30.0, atol=3.0, err_msg=name)
 
 
+@pytest.mark.slow
+def test_a_belly_does_not_move_the_spine(figure, placed):
+    """Lumps of 5 cm on the belly, and all of it 12 cm further out: joints stay where they are."""
+    vertices = figure.surface.vertices
+    normals = trimesh.Trimesh(vertices, figure.surface.faces, process=False).vertex_normals
+    belly = np.array([0.0, placed["vertebra2"][1], vertices[:, 2].max()])
+    front = vertices[:, 2] > placed["vertebra2"][2]
+    middle = vertices[front][np.linalg.norm(vertices[front] - belly, axis=1).argmin()]
+    lumps = np.zeros(len(vertices))
+    for x, y in ((-0.08, 0.06), (0.07, 0.08), (0.02, -0.02), (-0.06, -0.05), (0.09, -0.04), (0.0, 0.1)):
+        lumps += 0.05 * np.exp(-((np.linalg.norm(vertices - middle - np.array([x, y, 0.0]), axis=1) / 0.04) ** 2))
+    whole = np.exp(-((np.linalg.norm(vertices - middle, axis=1) / 0.18) ** 2)) * front
+    for surface in (vertices + lumps[:, None] * normals, vertices + 0.12 * whole[:, None] * [0.0, 0.0, 1.0]):
+        points = propose_points(surface, figure.surface.faces)
+        for name, place in placed.items():
+            assert np.linalg.norm(points[name] - place) < 0.03, name
+
+
 @pytest.fixture(scope="module")
 def whole(hands):
     """Points of both hands, in metres."""

@@ -7,9 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import pyvista as pv
+import trimesh
 
 from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
+from warpjld.skeleton import Skeleton, default_limits
+from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
+from warpjld.skeleton.recognise.knuckle_width import widest_at_knuckles
 from warpjld.skeleton.recognise.placing import check_placing
 
 
@@ -70,6 +74,45 @@ def test_a_knuckle_along_its_finger(hands, digit, by):
     places = dict(zip(rig.skeleton.names, rig.skeleton.rest, strict=True))
     along = unit(places[f"left.{digit}.knuckle3"] - places[f"left.{digit}.knuckle2"])
     check_named(rig, f"left.{digit}.knuckle2", by * along, 0.6)
+
+
+@pytest.mark.parametrize("hand", ["hand_anny/left.glb", "hand_webxr_generic/right.glb"])
+def test_joints_along_digits_in_hands_of_others(data, hand):
+    """All named where they were, and no other joint in their place."""
+    rig = load_rig(data / hand)
+    side = rig.skeleton.names[0].partition(".")[0]
+    places = dict(zip(rig.skeleton.names, rig.skeleton.rest, strict=True))
+    for digit in DIGITS:
+        before, at, after, tip = (places[f"{side}.{digit}.{joint}"] for joint in FINGER_JOINTS)
+        for joint, to in (("knuckle2", before), ("knuckle2", after), ("knuckle3", at), ("knuckle3", tip)):
+            if (digit, joint, to is after) == ("thumb", "knuckle2", True):
+                continue  # bases of thumbs differ by as much from rig to rig
+            offset = 0.008 * unit(to - places[f"{side}.{digit}.{joint}"])
+            check_named(rig, f"{side}.{digit}.{joint}", offset, 0.7)
+
+
+def test_knuckles_are_where_fingers_are_widest(hands, data):
+    for rig, seen in ((hands["left"], 3), (load_rig(data / "hand_anny/left.glb"), 3)):
+        surface = rig.surface
+        found = widest_at_knuckles(rig.skeleton, surface.vertices, surface.faces)
+        assert len(found) >= seen
+        assert max(map(abs, found.values())) < 0.005
+        # measured from wherever the joint is said to be
+        name, away = next(iter(found.items()))
+        k = rig.skeleton.index(name)
+        rest = rig.skeleton.rest.copy()
+        rest[k] += 0.004 * unit(rest[k] - rest[rig.skeleton.parents[k]])
+        moved = widest_at_knuckles(replace(rig.skeleton, rest=rest), surface.vertices, surface.faces)
+        assert moved[name] == pytest.approx(away - 0.004, abs=0.002)
+
+
+def test_a_tube_has_no_widest_place():
+    tube = trimesh.creation.capsule(height=0.08, radius=0.008, count=(32, 32))
+    names = tuple(f"left.index.{joint}" for joint in FINGER_JOINTS)
+    rest = np.array([[0.0, 0, 0], [0, 0, 0.03], [0, 0, 0.055], [0, 0, 0.08]])
+    axes = np.tile([1.0, 0.0, 0.0], (4, 1))
+    skeleton = Skeleton(names, np.array([-1, 0, 1, 2], dtype=np.int32), rest, axes, default_limits(names))
+    assert widest_at_knuckles(skeleton, np.array(tube.vertices), np.array(tube.faces, dtype=np.int32)) == {}
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,11 @@ _ANKLE = 0.043
 _KNEE = 0.5  # share of the way from ankle to hip
 _SPINE = (0.14, 0.28, 0.45, 0.72)  # vertebrae: shares of the way from the pelvis to the lowest vertebra of the neck
 _SPINE_DEPTH, _SKULL_DEPTH = 0.42, 0.3  # share of the trunk's depth from the back; the mouth lies before the skull base
+_WAIST = (0.56, 0.76)  # range of heights at which the trunk's depth is measured
+_LEAN = 1.15
+"""Depth of the trunk that counts for spine and hips, per its least depth there: without a belly, breasts or folds of
+clothes, depths from waist to chest differ by an eighth."""
+_HIPS = 1.3  # likewise at the hips, with the buttocks
 _NECK = (0.80, 0.92)  # range of heights that is searched for the narrowest section of the neck
 _ELBOW = 0.48  # share of the way from wrist to shoulder
 _SHOULDER = 0.1  # head of the humerus from the midline
@@ -112,7 +117,8 @@ def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
     crotch = _crotch(solid)
     high = crotch + _HIP
     legs = solid.points[:, 1] < crotch
-    middle = solid.points[_slab(solid, high) & (np.abs(solid.points[:, 0]) < 0.12)].mean(axis=0)
+    section = solid.points[_slab(solid, high) & (np.abs(solid.points[:, 0]) < 0.12)]
+    middle = section[section[:, 2] < section[:, 2].min() + _HIPS * _lean_depth(solid)].mean(axis=0)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         thigh = solid.points[_leg_section(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
         hip = np.array([thigh[0], high, (thigh[2] + middle[2]) / 2])
@@ -171,10 +177,11 @@ def _trunk(solid: VoxelSolid, points: Points) -> None:
     lowest, base = neck - 0.02, neck + 0.035
     spine = {"vertebra5": lowest, "skull_base": base}
     spine |= {f"vertebra{k}": pelvis[1] + s * (lowest - pelvis[1]) for k, s in enumerate(_SPINE, start=1)}
+    lean = _lean_depth(solid)
     for name, height in spine.items():
         back, front = _depths(solid, height)
         share = _SKULL_DEPTH if name == "skull_base" else _SPINE_DEPTH
-        points[name] = np.array([0.0, height, back + share * (front - back)])
+        points[name] = np.array([0.0, height, back + share * min(front - back, lean)])
     height = lowest - 0.035
     back, front = _depths(solid, height)
     points["sternum"] = np.array([0.0, height, back + 0.75 * (front - back)])
@@ -186,6 +193,12 @@ def _depths(solid: VoxelSolid, height: float) -> tuple[float, float]:
     """Back and front of the trunk on its midline."""
     z = solid.points[_slab(solid, height) & (np.abs(solid.points[:, 0]) < 0.02), 2]
     return (float(z.min()), float(z.max())) if len(z) else (0.0, 0.0)
+
+
+def _lean_depth(solid: VoxelSolid) -> float:
+    """Largest depth of the trunk that counts, so that what bulges in front does not move the spine."""
+    depths = [front - back for back, front in (_depths(solid, float(y)) for y in np.linspace(*_WAIST, 9))]
+    return _LEAN * min(depths)
 
 
 def _head(solid: VoxelSolid, surface: Array, points: Points) -> None:

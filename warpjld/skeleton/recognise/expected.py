@@ -1,8 +1,8 @@
-"""Expected positions of joints along limbs, fingers and spine, and mirrored from the other side (R14).
+"""Expected positions of joints along limbs and spine, and mirrored from the other side (R14).
 
-One criterion: a joint lies where comparable joints of the same body lie. For fingers these are the other fingers of the
-hand, for limbs the other side and the two halves of the limb, for the spine its neighbours and the midline. Tolerances
-are the largest deviations found in existing rigs.
+One criterion: a joint lies where comparable joints of the same body lie. For limbs these are the other side and the two
+halves of the limb, for the spine its neighbours and the midline; for digits see ``expected_digits``. Tolerances are the
+largest deviations found in existing rigs.
 """
 
 from __future__ import annotations
@@ -17,22 +17,11 @@ from numpy.typing import NDArray
 from warpjld.geometry.rotations import unit
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 
-__all__ = ["Expectation", "body_expectations", "finger_expectations"]
+__all__ = ["Expectation", "body_expectations"]
 
 Array = NDArray[np.float64]
 Joints = Mapping[str, Array]
 
-# mean lengths of the phalanges to the tip's centre, and from the wrist to the base [mm] (Buryanov, Kotiuk 2010)
-_PHALANGES = {
-    "index": (39.8, 22.4, 15.0),
-    "middle": (44.6, 26.3, 16.5),
-    "ring": (41.4, 25.7, 16.5),
-    "pinky": (32.7, 18.1, 14.5),
-}
-_TO_BASE = {"index": 98.0, "middle": 95.0, "ring": 89.0, "pinky": 84.0}
-_ALONG = 0.045  # tolerance for a finger's joint against the other fingers, per length of the palm
-_THUMB = (0.51, 0.65)  # usual place of second and third joint between their neighbours, as a share
-_THUMB_ALONG = 0.08  # tolerance for thumbs, per length of both bones
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 _HALVES = 1.32  # largest ratio of a limb's halves: 1.02 to 1.13 are usual, knees a tenth of the leg off give 1.4
 _ASIDE = 0.012  # tolerance from the midline, or from the mirror image, per height of the body
@@ -62,91 +51,6 @@ class Expectation:
     place: Array
     amount: float
     detail: str
-
-
-def finger_expectations(joints: Joints) -> list[Expectation]:
-    """Finger joints whose relative position differs from that of the other fingers."""
-    out = []
-    for side in ("left.", "right.", ""):
-        chains = {
-            digit: [joints[f"{side}{digit}.{joint}"] for joint in FINGER_JOINTS]
-            for digit in _PHALANGES
-            if all(f"{side}{digit}.{joint}" in joints for joint in FINGER_JOINTS)
-        }
-        wrist = joints.get(f"{side}wrist")
-        if len(chains) < 4 or wrist is None:
-            continue
-        palms = {digit: float(np.linalg.norm(chain[0] - wrist)) for digit, chain in chains.items()}
-        relative = {digit: palms[digit] / _TO_BASE[digit] for digit in chains}
-        palm = float(np.median(list(relative.values()))) * _TO_BASE["middle"]
-        wrong = set()
-        for digit, chain in chains.items():
-            others = np.median([relative[d] for d in chains if d != digit])
-            off = float((relative[digit] - others) * _TO_BASE[digit])
-            if abs(off) > _ALONG * palm:
-                finger = unit(chain[1] - chain[0])
-                wrong.add(digit)
-                out.append(
-                    Expectation(
-                        f"{side}{digit}.base",
-                        "proportion",
-                        chain[0] - off * finger,
-                        abs(off),
-                        f"{1e3 * palms[digit]:.0f} mm from the wrist, beside the other fingers "
-                        f"{1e3 * (palms[digit] - off):.0f} are expected",
-                    )
-                )
-        out += _thumb(side, joints)
-        out += _knuckles(side, {d: c for d, c in chains.items() if d not in wrong}, palm)
-    return out
-
-
-def _thumb(side: str, joints: Joints) -> list[Expectation]:
-    """A thumb has no comparable neighbour: each joint is compared with its own neighbours; the worse of two."""
-    names = [f"{side}thumb.{joint}" for joint in FINGER_JOINTS]
-    if not all(name in joints for name in names):
-        return []
-    found = []
-    for k, usual in ((1, _THUMB[0]), (2, _THUMB[1])):
-        before, at, after = (joints[name] for name in names[k - 1 : k + 2])
-        first, second = float(np.linalg.norm(at - before)), float(np.linalg.norm(after - at))
-        off = first - usual * (first + second)
-        if abs(off) > _THUMB_ALONG * (first + second):
-            way = unit(before - at) if off > 0 else unit(after - at)
-            detail = f"{1e3 * first:.1f} mm before it, {1e3 * second:.1f} behind"
-            found.append(Expectation(names[k], "proportion", at + abs(off) * way, abs(off), detail))
-    return sorted(found, key=lambda expectation: -expectation.amount)[:1]
-
-
-def _knuckles(side: str, chains: Mapping[str, list[Array]], palm: float) -> list[Expectation]:
-    if len(chains) < 3:
-        return []
-    found: list[Expectation] = []
-    shares, lengths = {}, {}
-    for digit, chain in chains.items():
-        bones = np.linalg.norm(np.diff(np.array(chain), axis=0), axis=1)
-        usual = np.cumsum(_PHALANGES[digit]) / sum(_PHALANGES[digit])
-        lengths[digit] = float(bones.sum())
-        shares[digit] = (np.cumsum(bones) / bones.sum() - usual)[:2]
-    for digit, chain in chains.items():
-        others = np.median([shares[d] for d in chains if d != digit], axis=0)
-        off = (shares[digit] - others) * lengths[digit]
-        k = int(np.abs(off).argmax())
-        if abs(off[k]) <= _ALONG * palm:
-            continue
-        before, at, after = chain[k], chain[k + 1], chain[k + 2]
-        way = unit(before - at) if off[k] > 0 else unit(after - at)
-        found.append(
-            Expectation(
-                f"{side}{digit}.{FINGER_JOINTS[k + 1]}",
-                "proportion",
-                at + abs(float(off[k])) * way,
-                abs(float(off[k])),
-                f"{abs(1e3 * float(off[k])):.1f} mm {'further out' if off[k] > 0 else 'further in'} than beside the "
-                "other fingers",
-            )
-        )
-    return found
 
 
 def body_expectations(

@@ -12,7 +12,9 @@ from warpjld.geometry.coincident import close_pairs, connected_parts
 from warpjld.geometry.winding import winding_numbers
 from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.recognise.complete_body import find_extremities
-from warpjld.skeleton.recognise.expected import body_expectations, finger_expectations
+from warpjld.skeleton.recognise.expected import body_expectations
+from warpjld.skeleton.recognise.expected_digits import finger_expectations
+from warpjld.skeleton.recognise.knuckle_width import widest_at_knuckles
 from warpjld.skeleton.recognise.section import first_hits
 from warpjld.skeleton.tree import Skeleton
 
@@ -156,7 +158,7 @@ def _millimetres(offset: NDArray[np.float64]) -> tuple[float, float, float]:
 def _check_expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Finding]:
     """Joints that deviate from comparable joints of the same body."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
-    found = finger_expectations(joints)
+    found = finger_expectations(joints, widest_at_knuckles(skeleton, vertices, faces))
     up, _ = body_frame(joints)
     if up is not None:
         high = vertices[np.unique(faces)] @ up
