@@ -67,7 +67,7 @@ def load_study(path: str | Path) -> FemStudy:
         precision = solver.text("precision", "float64", known=PRECISIONS) or "float64"
         solver.finish()
         top.finish()
-        check_size(mesh.points, "[mesh]", "its size or scale")
+        check_size(mesh.nodes, "[mesh]", "its size or scale")
         body = Body(mesh, materials, initial_stress=stress)
         for step in steps:
             external_forces(body, step.loads)
