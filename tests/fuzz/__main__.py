@@ -76,6 +76,7 @@ def _turn(tally: Tally, name: str, number: int, seconds: float, folder: Path) ->
         tally.found.append((name, f"{what}\n{said[-800:]}", str(kept)))
     elif not found:
         shutil.rmtree(place, ignore_errors=True)
+    print(f"seed {number} {name}: {tally.tried[name]:,} inputs, {len(tally.found)} findings so far", flush=True)
 
 
 def main() -> int:

@@ -77,6 +77,13 @@ def test_its_limits_are_those_of_this_process(path: Path, monkeypatch: pytest.Mo
         _read(path, "wait", 60)
 
 
+def test_a_process_that_does_not_start_is_one_line(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    separate_process.running_process().end()
+    monkeypatch.setattr("sys.executable", str(path.parent / "no-python"))
+    with pytest.raises(InputError, match=r"a\.txt: cannot be read as nothing: .* does not start \(No such file"):
+        _read(path, "", 5)
+
+
 def test_a_fork_asks_a_process_of_its_own(path: Path) -> None:
     ours = _read(path, "", 5)[0]["process"]
     child = os.fork()

@@ -20,10 +20,12 @@ def checked_device(name: str) -> wp.Device:
     import warp as wp
 
     wp.init()
+    known = ", ".join(str(d) for d in wp.get_devices())
+    if name.startswith("cuda") and not wp.get_cuda_devices():  # asking for one prints what the driver says
+        raise InputError(f"device '{name}' is not available; want one of: {known}")
     try:
         return wp.get_device(name)
     except (ValueError, RuntimeError) as error:  # RuntimeError: no driver for any CUDA device
-        known = ", ".join(str(d) for d in wp.get_devices())
         raise InputError(f"device '{name}' is not available; want one of: {known}") from error
 
 

@@ -72,7 +72,11 @@ def separately(place: tuple[str, str], path: Path, kind: str, *arguments: object
 def _answer(request: str, path: Path, kind: str, memory: int) -> Answer:
     seconds, code = limit("reader-seconds"), 0
     for _ in range(_TRIES):
-        process = running_process()
+        try:
+            process = running_process()
+        except OSError as error:
+            why = f"the process that reads it does not start ({error.strerror or error})"
+            raise InputError(f"cannot be read as {kind}: {why}", path=path) from error
         line = process.asked(request, seconds)
         if line.endswith("\n"):
             told = json.loads(line)

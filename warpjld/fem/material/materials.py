@@ -14,6 +14,8 @@ from warpjld.fem.mesh.hexmesh import HexMesh
 
 __all__ = ["Fung", "LinearElastic", "Material", "MaterialWarning", "MooneyRivlin", "NeoHooke", "laws_of"]
 
+_STIFFEST = 1e18
+"""Largest modulus [Pa], a million times that of diamond, and density [kg/m³]; the smallest modulus is its inverse."""
 _USUAL_POISSON = 0.49  # larger values cause a warning
 LINEAR, LINEAR_FULL, NEO_HOOKE, MOONEY_RIVLIN, FUNG, NEO_HOOKE_FULL = range(6)
 """Numbers of the laws, as in ``warpjld_kernels.fem_laws``."""
@@ -138,12 +140,12 @@ def Fung(young: float, stiffening: float, poisson: float = 0.48, density: float 
 
 
 def _moduli(young: float, poisson: float, density: float) -> tuple[float, float]:
-    if not (young > 0.0 and np.isfinite(young)):
-        raise InputError(f"young: want a modulus above 0 Pa, got {young}")
+    if not 1.0 / _STIFFEST <= young <= _STIFFEST:
+        raise InputError(f"young: want a modulus above 0 Pa, {1.0 / _STIFFEST:g} to {_STIFFEST:g}, got {young}")
     if not -1.0 < poisson < 0.5:
         raise InputError(f"poisson: want −1 < ν < 0.5 (0.49 to 0.4999 for rubber and flesh), got {poisson}")
-    if not (density >= 0.0 and np.isfinite(density)):
-        raise InputError(f"density: want 0 kg/m³ or more, got {density}")
+    if not 0.0 <= density <= _STIFFEST:
+        raise InputError(f"density: want 0 kg/m³ or more, at most {_STIFFEST:g}, got {density}")
     if poisson > _USUAL_POISSON:
         warnings.warn(
             f"Poisson's ratio {poisson}: above {_USUAL_POISSON} the solver needs several times the iterations",

@@ -22,6 +22,7 @@ from warpjld.fem.solver.static import FREE
 from warpjld.fem.study.study import FemStudy, Step, Support
 from warpjld.files.names import check_name, clash
 from warpjld.files.toml_table import TomlTable, read_toml
+from warpjld.geometry.lengths import check_size
 from warpjld.limits import check_limit
 
 __all__ = ["load_study"]
@@ -66,6 +67,7 @@ def load_study(path: str | Path) -> FemStudy:
         precision = solver.text("precision", "float64", known=PRECISIONS) or "float64"
         solver.finish()
         top.finish()
+        check_size(mesh.nodes, "[mesh]", "its size or scale")
         body = Body(mesh, materials, initial_stress=stress)
         for step in steps:
             external_forces(body, step.loads)
