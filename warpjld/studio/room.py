@@ -98,8 +98,9 @@ class Room:
         self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs, so always visible
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
-            self.stage, ghosts, views = StagePanel(self), GhostsPanel(self), ViewsPanel(self)
             pose = PoseToolsPanel(self)
+            with gui.add_folder("Stage"):
+                self.stage, ghosts, views = StagePanel(self), GhostsPanel(self), ViewsPanel(self)
             self.drag, self.things, self.skin = DragPanel(self), ThingsPanel(self), SkinPanel(self)
             self.selected, sliders = SelectedPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
