@@ -24,7 +24,7 @@ from warpjld.studio.room import Room
 
 PICTURES = Path(__file__).resolve().parent / "pictures"
 SIZE = {"width": 1180, "height": 820}
-FLAGS = ["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+FLAGS = ["--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader"]
 
 CURL = "HAND LEFT BUILTIN\nPOSE LEFT RELAXED 0\nPOSE LEFT FIST 20\n"
 BALL = "HAND LEFT BUILTIN RESOLUTION 1500\nOBJECT BALL1 BALL 0.065 AT 0 0.1 0\n"
@@ -141,6 +141,10 @@ def main() -> None:
             prepare(page, room)
             room.worker.settle()
             page.wait_for_timeout(4000)  # software WebGL draws when it can
+            page.wait_for_function(
+                "(c => c.width > 1.2 * c.clientWidth)(document.querySelector('canvas[data-engine]'))"
+            )
+            page.wait_for_timeout(1000)
             shot = Image.open(BytesIO(page.screenshot())).convert("RGB")
             shot.save(into / f"{name}.jpg", quality=80, optimize=True)
             page.close()

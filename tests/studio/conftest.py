@@ -83,7 +83,14 @@ class Window:
         # the hint that WebGL is computed in software comes and goes over the canvas
         self.page.add_style_tag(content=".mantine-Notifications-root, .mantine-Notification-root {display: none}")
         self.page.get_by_text("Joints", exact=True).wait_for()
-        self._width = int(self.page.get_by_role("tab", name="Pose", exact=True).bounding_box()["x"]) - 30
+        widths = [-1]
+
+        def laid_out() -> bool:
+            widths.append(int(self.page.get_by_role("tab", name="Pose", exact=True).bounding_box()["x"]) - 30)
+            return widths[-1] == widths[-2] and self.fine()
+
+        until(laid_out, "the panels are where they belong")
+        self._width = widths[-1]
         until(lambda: self.skin() > 1000, "the hand is drawn")
 
     def pixels(self) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 from warpjld.script.staging import stage
 from warpjld.studio.document import ScriptDocument
 from warpjld.studio.hand_pose import COARSE, coarse_angles, coarse_share
-from warpjld.studio.reach_tips import reach_tips, tips
+from warpjld.studio.reach_tips import reach_tips, reach_wrist, tips
 from warpjld.studio.state import StudioState
 
 TEXT = "HAND LEFT BUILTIN RESOLUTION 1500\nMOVE LEFT 0 0.1 0.2 0.3\nTURN LEFT 0 20 40 60\n"
@@ -68,3 +68,24 @@ def test_coarse_shares_are_read_back_from_the_pose(state: StudioState, name: str
     assert state.set_angles(coarse_angles(name, share, "left"))
     assert coarse_share(name, state.angles(), "left") == pytest.approx(share, abs=0.06)
     assert coarse_share(name, {}, "left") is None
+
+
+def test_a_wrist_is_reached_by_the_joints_above_it_and_a_hand_alone_has_none(
+    state: StudioState, tmp_path: Path
+) -> None:
+    assert state.actor is not None
+    assert reach_wrist(state.actor, "left", 0.0, np.zeros(3)) == {}
+    body = StudioState(ScriptDocument(tmp_path / "b.jld", "BODY BUILTIN\n"), tmp_path / "out")
+    assert body.actor is not None
+    wrist = body.actor.skeleton.names.index("left.wrist")
+
+    def place() -> np.ndarray:
+        return stage(body.actor, np.array([0.0]), 30.0).positions[0, wrist]
+
+    target = place() + np.array([0.0, 0.05, 0.1])
+    found = reach_wrist(body.actor, "left", 0.0, target)
+    assert body.set_angles(found)
+    assert np.linalg.norm(place() - target) < 2e-3
+    for channel, degrees in found.items():
+        low, high = body.channels()[channel]
+        assert low <= degrees <= high

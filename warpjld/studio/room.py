@@ -36,6 +36,7 @@ from warpjld.studio.worker import Worker
 __all__ = ["Room"]
 
 LOCAL = "127.0.0.1"
+_WIDTH = 384  # of the panels [CSS pixels]: labels, a slider with its limits, and its number side by side
 
 
 class Room:
@@ -93,11 +94,13 @@ class Room:
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.set_panel_label("warpjld studio")
         gui.main_panel.dock_right()
+        gui.main_panel.set_width(_WIDTH)  # else a page that loads slowly docks it before it knows the theme's width
         self.progress, messages = ProgressPanel(self), MessagesPanel(self)  # above all tabs, so always visible
         tabs = gui.add_tab_group()
         with tabs.add_tab("Pose"):
-            self.stage, ghosts, views = StagePanel(self), GhostsPanel(self), ViewsPanel(self)
             pose = PoseToolsPanel(self)
+            with gui.add_folder("Stage"):
+                self.stage, ghosts, views = StagePanel(self), GhostsPanel(self), ViewsPanel(self)
             self.drag, self.things, self.skin = DragPanel(self), ThingsPanel(self), SkinPanel(self)
             self.selected, sliders = SelectedPanel(self), SlidersPanel(self)
         with tabs.add_tab("Script"):
