@@ -153,7 +153,10 @@ def measure(
     # points
     points: wp.array2d(dtype=wp.vec3),
     limit: wp.float64,
+    # points first to end, in runs of so many
     first: int,
+    end: int,
+    run: int,
     # out
     distance_out: wp.array2d(dtype=float),
     face_out: wp.array2d(dtype=wp.int32),
@@ -161,14 +164,24 @@ def measure(
 ):
     """Distances of every row's set of points to its object at its place; nearest points are on the stage.
 
-    ``point_out`` may be empty.
+    A run's points are measured one after another, within the distance to what is nearest to the one before: of points
+    side by side most lie near. ``point_out`` may be empty.
     """
     row, part = wp.tid()
-    i = first + part
     turn = rotation[row]
     origin = position[row]
-    hit = nearest(solids, object_of[row], wp.quat_rotate_inv(turn, wp.vec3d(points[set_of[row], i]) - origin), limit)
-    distance_out[row, i] = hit.distance
-    face_out[row, i] = hit.face
-    if hit.face >= 0 and point_out.shape[0] > 0:
-        point_out[row, i] = wp.vec3(wp.quat_rotate(turn, wp.vec3d(hit.point)) + origin)
+    last = wp.vec3d(wp.float64(0.0))
+    known = bool(False)
+    for i in range(first + part * run, wp.min(first + (part + 1) * run, end)):
+        local = wp.quat_rotate_inv(turn, wp.vec3d(points[set_of[row], i]) - origin)
+        within = limit
+        if known:
+            within = wp.min(limit, wp.length(local - last) * wp.float64(1.0001) + wp.float64(1.0e-6))
+        hit = nearest(solids, object_of[row], local, within)
+        distance_out[row, i] = hit.distance
+        face_out[row, i] = hit.face
+        if hit.face >= 0:
+            known = True
+            last = wp.vec3d(hit.point)
+            if point_out.shape[0] > 0:
+                point_out[row, i] = wp.vec3(wp.quat_rotate(turn, wp.vec3d(hit.point)) + origin)

@@ -15,6 +15,9 @@ WIDTH = 8
 SLIVER = 1e-20
 """Squared area by which a triangle counts as its edges alone, as a part of the sum of its squared edges, squared."""
 
+ROUNDING = 2e-5
+"""Error of a distance to a triangle in float32, as a part of the triangle's size and of the coordinates."""
+
 WAITING = 128
 """Places on the stack of a search, of which every level of the tree takes seven."""
 
@@ -44,6 +47,7 @@ class Tree:
     int count = 1, nearest = -1;
     double best = bound * bound;
     const float at[3] = {{(float)point[0], (float)point[1], (float)point[2]}};
+    const float rounded = fabsf(at[0]) + fabsf(at[1]) + fabsf(at[2]);
     while (count) {{
         const wp::uint64 next = stack[--count];
         const wp::uint32 bits = next >> 32;
@@ -67,6 +71,44 @@ class Tree:
                     outside += gap * gap;
                 }}
                 if (!LANES_OF(outside * 0.999998f <= (float)best)) continue;
+                // distances in float32, for leaves that are near but hold nothing nearer
+                {{
+                    Floats corner[3][3], edge[3][3], normal[3], low = Floats(0.0f), side_of = Floats(3e38f);
+                    Floats size = Floats(rounded);
+                    for (int k = 0; k < 3; ++k)
+                        for (int i = 0; i < 3; ++i)
+                            corner[k][i] = *(const Stored*)(leaf + {WIDTH} * (3 * k + i) + base) - at[i];
+                    for (int k = 0; k < 3; ++k)
+                        for (int i = 0; i < 3; ++i) {{
+                            edge[k][i] = corner[(k + 1) % 3][i] - corner[k][i];
+                            size += HIGHEST(edge[k][i], -edge[k][i]);
+                        }}
+                    for (int i = 0; i < 3; ++i) {{
+                        const int j = (i + 1) % 3, m = (i + 2) % 3;
+                        normal[i] = edge[0][j] * edge[1][m] - edge[0][m] * edge[1][j];
+                    }}
+                    for (int k = 0; k < 3; ++k) {{
+                        const Floats* a = corner[k];
+                        const Floats* b = corner[(k + 1) % 3];
+                        const Floats* e = edge[k];
+                        const Floats length = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+                        Floats t = -(a[0] * e[0] + a[1] * e[1] + a[2] * e[2]) / HIGHEST(length, Floats(1e-36f));
+                        t = LOWEST(HIGHEST(t, Floats(0.0f)), Floats(1.0f));
+                        const Floats x = a[0] + t * e[0], y = a[1] + t * e[1], z = a[2] + t * e[2];
+                        const Floats to_edge = x * x + y * y + z * z;
+                        low = k ? LOWEST(low, to_edge) : to_edge;
+                        side_of = LOWEST(side_of, normal[0] * (a[1] * b[2] - a[2] * b[1])
+                            + normal[1] * (a[2] * b[0] - a[0] * b[2]) + normal[2] * (a[0] * b[1] - a[1] * b[0]));
+                    }}
+                    Floats height = corner[0][0] * normal[0];
+                    height += corner[0][1] * normal[1] + corner[0][2] * normal[2];
+                    const Floats wide = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+                    const Floats to_plane = height * height / HIGHEST(wide, Floats(1e-36f));
+                    low = side_of >= Floats(0.0f) ? LOWEST(low, to_plane) : low;
+                    // narrower triangles than a part in 10⁵ of their size may count as their edges alone
+                    const Floats most = (float)sqrt(best) * 1.00001f + {ROUNDING} * size;
+                    if (!LANES_OF(low <= most * most)) continue;
+                }}
                 Doubles corner[3][3], edge[3][3], normal[3], squared;
                 Doubles lateral = Doubles(1e300), lengths = Doubles(0.0);
                 for (int k = 0; k < 3; ++k)

@@ -27,6 +27,17 @@ def test_products_are_those_of_scipy(seed: int) -> None:
 
 
 @given(seeds)
+def test_few_are_computed_as_many_are(seed: int) -> None:
+    """Bit for bit: a pose is the same alone and in a batch."""
+    a, b = turns(seed, 1200).reshape(2, 600, 4) * 1.3
+    for product, other in ((multiply, b), (rotate, b[:, :3])):
+        many = product(a, other)
+        few = np.concatenate([product(a[k : k + 7], other[k : k + 7]) for k in range(0, 600, 7)])
+        np.testing.assert_array_equal(few, many)
+        np.testing.assert_array_equal(product(a[:3, None], other[None, :5])[2, 4], product(a[2], other[4]))
+
+
+@given(seeds)
 def test_minimal_rotation_turns_one_into_the_other_without_twist(seed: int) -> None:
     a, b = unit(np.random.default_rng(seed).normal(size=(2, 5, 3)))
     turn = minimal_rotation(a, b)

@@ -13,6 +13,8 @@ __all__ = [
     "allow_mixed",
     "commands",
     "device",
+    "device_of_script",
+    "device_of_study",
     "domains",
     "fresh_start",
     "json",
@@ -32,6 +34,19 @@ out_folder: Decorator = click.option(
     "-o", "--out", type=click.Path(path_type=Path), default="out", show_default=True, help="Output folder."
 )
 device: Decorator = click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda:0, …")
+device_of_study: Decorator = click.option(
+    "--device",
+    default="cpu",
+    show_default=True,
+    help="Where the skin of closed hands and first distances are computed: cpu, cuda:0, …; closing, contacts, force "
+    "closure and [contact] stay on the CPU.",
+)
+device_of_script: Decorator = click.option(
+    "--device",
+    default="cpu",
+    show_default=True,
+    help="Where the skin and flexion searches are computed: cpu, cuda:0, …; GRASP, TOUCH and PRESS stay on the CPU.",
+)
 threads: Decorator = click.option(
     "--threads", type=click.IntRange(min=1), help="CPU threads; chosen automatically by default."
 )

@@ -15,7 +15,7 @@ __all__ = ["run_command"]
 @click.command("run")
 @click.argument("script", type=click.Path(path_type=Path))
 @options.out_folder
-@options.device
+@options.device_of_script
 @options.threads
 @options.commands
 @click.option("--check", is_flag=True, help="Check the script and list its outputs; compute nothing.")

@@ -44,7 +44,7 @@ __all__ = ["score_command"]
 @options.trial_processes
 @options.table_format
 @options.fresh_start
-@options.device
+@options.device_of_study
 @options.ray
 @options.allow_mixed
 @options.json

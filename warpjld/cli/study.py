@@ -32,7 +32,7 @@ __all__ = ["study_command"]
 )
 @click.option("--only", metavar="ROWS", help="Trials that --export writes, such as 0-9,17; by default all that closed.")
 @click.option("--check", is_flag=True, help="Check the plan and load its hands and objects; run nothing.")
-@options.device
+@options.device_of_study
 @options.ray
 @options.allow_mixed
 @options.json

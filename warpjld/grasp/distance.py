@@ -37,6 +37,9 @@ class Distances:
     point: NDArray[np.float32] | None
 
 
+_RUN = 32  # points that one thread of the CPU measures one after another
+
+
 class ObjectSet:
     """Search structures of objects on a device; built once, used by distances and searches.
 
@@ -139,13 +142,13 @@ class ObjectSet:
             wp.array(a, dtype=k, device=self.device, copy=False)
             for a, k in ((distance, float), (face, wp.int32), (point, wp.vec3))
         ]
-        reach = float(min(limit, 1e9))
+        reach, run = float(min(limit, 1e9)), _RUN if self.device.is_cpu else 1
 
         def span(begin: int, end: int) -> None:
             wp.launch(
                 measure,
-                dim=(count, end - begin),
-                inputs=[self.solids, *inputs, reach, begin],
+                dim=(count, -(-(end - begin) // run)),
+                inputs=[self.solids, *inputs, reach, begin, end, run],
                 outputs=outs,
                 device=self.device,
             )
