@@ -68,8 +68,8 @@ def test_a_corner_that_presses_between_nodes_is_told_of() -> None:
     assert found.last.touches[0].normal_force > 0.0
 
 
-def two_balls(*sides: str) -> list[str]:
-    """Warnings of a ball of eight elements (a) pressed by one of four (b): slave and master."""
+def two_balls(slave: str, master: str) -> list[str]:
+    """Warnings of a ball of eight elements (a) pressed by one of four (b)."""
     a, b = named(ball_hexes(1.0, n=8), "a"), named(ball_hexes(1.0, n=4), "b", (0.03, 0.02, 2.0))
     body = together({"a": (a, LinearElastic(1.0, 0.3)), "b": (b, LinearElastic(1.0, 0.3))})
     height = body.mesh.nodes[:, 2]
@@ -77,7 +77,7 @@ def two_balls(*sides: str) -> list[str]:
     held = prescribe(body.mesh, low, x=0.0, y=0.0, z=0.0) + prescribe(body.mesh, top, x=0.0, y=0.0, z=-0.15)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        press(body, held, [Pair(*sides)])
+        press(body, held, [Pair(slave, master)])
     return [str(one.message) for one in told if issubclass(one.category, ContactWarning)]
 
 

@@ -40,8 +40,9 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
 5. *Alternating phase*, afterwards: λ is updated only if the active set did not change; otherwise a line search along Δu
    (by work, or by the residual if E is present) settles the active set.
    In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points
-   touch, slide and stick in successive iterations, as iterating over Tresca bounds leaves up to 0.7 of the error each
-   time. If sticking points change because of that, the bound is taken from the previous solve again.
+   touch, slide and stick in successive iterations (four where some stick, else two), as iterating over Tresca bounds
+   leaves up to 0.7 of the error each time. If sticking points change because of that, the bound is taken from the
+   previous solve again.
    If the contact points do not agree with those searched again at convergence, iterations continue in this phase, at
    most twice. Points are also searched again once a node has moved by a twentieth of an edge since the last search.
    At convergence, (2) and (3) are evaluated once more at the slip found (``confirmed``), since its direction may differ
@@ -53,7 +54,7 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
 ``statics`` proves that friction cannot hold a body before that is reported. ``passing`` cuts steps longer than contact
 search can follow (by the ``predicted_motion``) and finds nodes deep inside another body; ``first_touch`` finds when
 in a step frictional contact begins; ``friction_continuation`` helps where friction alone holds a body; ``unresolved``
-finds corners and edges that the mesh is too coarse to resolve.
+finds corners and edges that the mesh is too coarse to resolve, ``facet_ridges`` facets that scatter pressures.
 
 Numeric constants of these modules have their units in brackets, none if they are dimensionless; those without a stated
 reason or source are assumed.

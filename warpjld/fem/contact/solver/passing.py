@@ -182,7 +182,9 @@ class Passing:
                 return True
         return False
 
-    def deepest(self, u: Array, time: float, touched: Sequence[Ints], slack: Array) -> tuple[float, int]:
+    def deepest(
+        self, u: Array, time: float, touched: Sequence[Ints], slack: Array, *, own: bool = True
+    ) -> tuple[float, int]:
         """Largest depth of an inactive node in another body [m], and the index of its interface; 0 if there is none.
 
         Args:
@@ -190,6 +192,7 @@ class Passing:
             time: Time of the obstacles.
             touched: Nodes in contact, of each interface.
             slack: Number of edge lengths by which a node may lie in the other body, of each interface.
+            own: Whether parts of one body are examined, too.
         """
         worst, which, x = 0.0, -1, self._moved(u)
         for side in self._sides:
@@ -200,7 +203,7 @@ class Passing:
             beyond = depth - slack[side.interface] * np.maximum(side.edge, side.opposite_edge)
             deepest = self._untouched(side.interface, side.nodes, beyond, depth, touched)
             worst, which = max((worst, which), (deepest, side.interface))
-        for side in self._own_sides:
+        for side in self._own_sides if own else ():
             deepest = self._untouched(side.interface, side.nodes, *self._own_depth(side, x, slack), touched)
             worst, which = max((worst, which), (deepest, side.interface))
         for k, interface, obstacle in self._obstacles:

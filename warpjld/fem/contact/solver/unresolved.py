@@ -66,7 +66,8 @@ def unresolved(
             "contact: forces are too low; use smaller elements"
         )
     else:
-        depth, k = passing.deepest(u, instant.time, nothing, np.full(len(interfaces), _PRESSED))
+        # flesh has no corners that press on itself, and folds at its joints
+        depth, k = passing.deepest(u, instant.time, nothing, np.full(len(interfaces), _PRESSED), own=False)
         if depth > 0.0:
             out.append(
                 f"{interfaces[k].pair.title}: a corner or an edge that presses lies {1e3 * depth:.3g} mm inside the "
