@@ -13,6 +13,7 @@ import warpjld as wj
 
 PHALANGES = ("base", "knuckle2", "knuckle3", "tip")
 HEAD, SHAFT = 0.0042, 0.0028  # radii of the proximal phalanx at its ends and in the middle [m]
+BACK = np.array([0.0, 0.0035, 0.0])  # from the joints towards the back of the hand, where bones lie under the skin [m]
 BONES = (("proximal", 1.0, 0.001), ("middle", 0.85, 0.001), ("distal", 0.6, 0.004))
 """Names, thickness per that of the proximal phalanx, and how far short of the far joint the bone ends [m]."""
 
@@ -36,7 +37,7 @@ def write_bones(rig: wj.Rig, path: Path) -> None:
     chain = [places[f"left.index.{joint}"] for joint in PHALANGES]
     lines, count = [], 0
     for (name, thick, short), start, end in zip(BONES, chain, chain[1:], strict=False):
-        bone = phalanx(start, end, thick, short)
+        bone = phalanx(start + thick * BACK, end + thick * BACK, thick, short)
         lines += [f"o {name} phalanx", *(f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in bone.vertices)]
         lines += [f"f {a} {b} {c}" for a, b, c in bone.faces + count + 1]
         count += len(bone.vertices)
