@@ -165,6 +165,16 @@ def test_flesh_of_two_actors(name: str, tmp_path) -> None:
 
 
 @pytest.mark.slow
+def test_bones_of_a_file(tmp_path, capsys) -> None:
+    """Waisted bones in place of round ones: another force of the same size."""
+    forces = runpy.run_path(str(EXAMPLES / "bones.py"))["main"](tmp_path, 0.004)
+    assert capsys.readouterr().out.count("CONVERGED") == 2
+    assert forces["round"] > 0.5
+    assert 0.3 < forces["waisted"] / forces["round"] < 3.0
+    assert forces["waisted"] != pytest.approx(forces["round"], rel=0.01)
+
+
+@pytest.mark.slow
 def test_an_arm_of_flesh_bends(tmp_path) -> None:
     summary = run_small("flesh_elbow.jld", tmp_path)
     assert summary["press"]["status"] == "CONVERGED"

@@ -44,6 +44,7 @@ class Mesh:
         parent: Joint that the node hangs on, -1 for none.
         geometric: Translation of the geometry in its node [m].
         shapes: Blend shapes: weight in per cent, and offsets [m] in the world, shape (W, 3).
+        texture: File of the texture of its material; empty: without material.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Mesh:
     parent: int = -1
     geometric: Sequence[float] = (0.0, 0.0, 0.0)
     shapes: Sequence[tuple[float, np.ndarray]] = ()
+    texture: str = ""
 
 
 @dataclass
@@ -266,6 +268,11 @@ class _Writer:
         model = self.add("Model", f"Model::{mesh.name}", "Mesh", f"Version: 232\n{_properties(rows)}")
         self.link(geometry, model)
         self.link(model, models[mesh.parent] if mesh.parent >= 0 else 0)
+        if mesh.texture:
+            material = self.add("Material", "Material::skin", "", 'Version: 102\nShadingModel: "lambert"')
+            file = f'Type: "TextureVideoClip"\nFileName: "{mesh.texture}"\nRelativeFilename: "{mesh.texture}"'
+            self.link(material, model)
+            self.link(self.add("Texture", "Texture::picture", "", file), material, "DiffuseColor")
         if mesh.shapes:
             self.shapes(mesh, geometry, inside)
         if mesh.joints is not None and mesh.weights is not None:

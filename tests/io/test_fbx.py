@@ -443,3 +443,18 @@ def test_animations_by_the_names_that_people_type(tmp_path: Path) -> None:
         assert len(read_fbx_animation(path, name=typed)) == frames
     with pytest.raises(InputError, match="no animation 'run'; it has"):
         read_fbx_animation(path, name="run")
+
+
+@pytest.mark.parametrize(("named", "drawn"), [("skin.png", True), ("D:\\art\\skin.png", True), ("../no.png", False)])
+def test_textures_beside_the_file(hand: Glb, tmp_path: Path, named: str, drawn: bool) -> None:
+    """As the file names it, or the same name beside it where the path is another machine's; never from elsewhere."""
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    (folder / "skin.png").write_bytes(b"picture")
+    (tmp_path / "no.png").write_bytes(b"another")
+    fbx = as_fbx(hand)
+    uv = np.random.default_rng(1).uniform(size=(hand.faces.size, 2)).astype(np.float32)
+    skin = replace(fbx.meshes[0], uv=uv, texture=named)
+    rig = read_fbx_rig(replace(fbx, meshes=[skin]).write(folder / "a.fbx"))
+    assert [part.texture for part in rig.parts] == [b"picture" if drawn else None]
+    assert any("not drawn" in note for note in rig.notes) is not drawn

@@ -148,6 +148,19 @@ def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) 
     return out
 
 
+def texture_of(mesh: Any) -> str:
+    """File of the base colour texture of a mesh with one material, as the file names it; "" without one."""
+    materials = elements(mesh.materials)
+    if len(materials) != 1:
+        return ""
+    maps = [materials[0].pbr.base_color, materials[0].fbx.diffuse_color]
+    KEPT.extend(maps)
+    for texture in (taken(one.texture) for one in maps):
+        if texture is not None:
+            return str(texture.relative_filename or texture.filename)
+    return ""
+
+
 def stacks(scene: Any, number: dict[int, int]) -> list[dict[str, Any]]:
     """Name, time span and moved nodes of every animation stack; the span is that of the keys if it states none."""
     out: list[dict[str, Any]] = []
@@ -223,7 +236,7 @@ def main(path: str, out: str, animated: str, name: str, rate: str, memory: str) 
         mesh = taken(node.mesh)
         if mesh is not None and len(mesh.vertices):
             arrays |= {f"{len(meshes)}.{k}": v for k, v in mesh_arrays(mesh, node, number, notes).items()}
-            meshes.append({"name": node.name or mesh.name, "node": n})
+            meshes.append({"name": node.name or mesh.name, "node": n, "texture": texture_of(mesh)})
     settings = scene.settings
     told: dict[str, Any] = {
         "names": [node.name for node in nodes],

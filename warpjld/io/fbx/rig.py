@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from warpjld.errors import InputError
+from warpjld.files.input_file import read_bytes
 from warpjld.io.fbx.scene import FbxMesh, FbxScene, FbxSkin, read_scene
 from warpjld.io.fbx.skeleton import FbxSkeleton, find_skeleton
+from warpjld.io.gltf.schema import inside_folder
 from warpjld.io.polygons import triangulate_polygons
 from warpjld.io.rig_meshes import RigMesh, joined
 from warpjld.io.source import SourceRig
@@ -97,7 +99,23 @@ def _place(scene: FbxScene, skeleton: FbxSkeleton, mesh: FbxMesh, notes: list[st
         corner_uv=corner_uv,
         polygons=polygons,
         polygon_count=len(mesh.counts),
+        texture=None if corner_uv is None or not mesh.texture else _texture(scene.path, mesh, notes),
     )
+
+
+def _texture(path: Path, mesh: FbxMesh, notes: list[str]) -> bytes | None:
+    """Encoded image of a mesh's texture: where the file names it, or of the same name beside the file.
+
+    Paths of another machine are common, and embedded images are not read.
+    """
+    name = mesh.texture.replace("\\", "/")
+    for place in (name, PurePosixPath(name).name):
+        try:
+            return read_bytes(path.parent / inside_folder(place))
+        except (InputError, OSError):
+            continue
+    notes.append(f"mesh '{mesh.name}': its texture '{mesh.texture}' is not beside the file: not drawn")
+    return None
 
 
 def _lower_detail(scene: FbxScene, node: int) -> bool:

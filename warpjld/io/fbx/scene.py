@@ -62,6 +62,7 @@ class FbxMesh:
         uv: Texture coordinates of every corner, origin at the image's lower left, or None.
         shown: Geometry-to-world transform of the displayed pose [m], shape (4, 4).
         skin: Its skin, or None.
+        texture: File of its base colour texture, as the file names it; empty without one.
     """
 
     name: str
@@ -72,6 +73,7 @@ class FbxMesh:
     uv: NDArray[np.float32] | None
     shown: NDArray[np.float64]
     skin: FbxSkin | None
+    texture: str = ""
 
 
 @dataclass(frozen=True)
@@ -247,7 +249,8 @@ def _mesh(
         skin = FbxSkin(own["nodes"], binds, own["inverses"], own["cluster"], own["vertex"], own["weight"])
     shown = own["shown"]
     _check(shown[None], (name,), path)
-    return FbxMesh(name, told["node"], points, own["counts"], own["corners"], own.get("uv"), axes @ shown, skin)
+    uv, texture = own.get("uv"), told.get("texture", "")
+    return FbxMesh(name, told["node"], points, own["counts"], own["corners"], uv, axes @ shown, skin, texture)
 
 
 def _check(transforms: NDArray[np.float64], names: tuple[str, ...], path: Path) -> None:

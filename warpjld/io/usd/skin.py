@@ -14,6 +14,7 @@ from warpjld.io.usd.influences import blended_points, read_usd_influences
 from warpjld.io.usd.mesh import read_usd_mesh
 from warpjld.io.usd.skeletons import UsdSkeleton, UsdSkeletons, read_skeletons
 from warpjld.io.usd.stage import UsdFile, open_usd, usd_matrices
+from warpjld.io.usd.texture import usd_texture
 
 __all__ = ["read_usd_rig"]
 
@@ -109,4 +110,5 @@ def _skinned(file: UsdFile, skeleton: UsdSkeleton, query: Any) -> RigMesh | None
         rigid=rigid,
         polygons=mesh.polygons,
         polygon_count=mesh.polygon_count,
+        texture=None if mesh.uv is None else usd_texture(file, prim),
     )
