@@ -18,6 +18,7 @@ from warpjld.files.input_file import open_input
 from warpjld.files.nesting import nesting
 from warpjld.geometry.lengths import LARGEST, SMALLEST, check_size
 from warpjld.io import load_rig
+from warpjld.io.mesh_file import read_mesh
 from warpjld.limits import LIMITS, check_limit, limit, set_limit, variable
 from warpjld.motion.hand_file import read_hands
 from warpjld.script import Interpreter, Scene
@@ -158,3 +159,9 @@ def test_recordings_as_json_are_limited_by_memory(tmp_path: Path, monkeypatch: p
     (tmp_path / "hand.json").write_text('{"frames": [[1, 2, 3]]}')
     with pytest.raises(InputError, match=r"hand\.json: JSON .*as \.npz or \.bvh\): 23 bytes; the limit is 20 "):
         read_hands(tmp_path / "hand.json")
+
+
+def test_a_mesh_whose_reader_never_ends(tmp_path: Path) -> None:
+    (tmp_path / "a.msh").write_bytes(b'(1 "meshio 5.3.5")\n(2 3)\n(3010 (1 1 8 1 3)(\n')
+    with pytest.raises(InputError, match=r"a\.msh: is an ANSYS mesh"):
+        read_mesh(tmp_path / "a.msh")

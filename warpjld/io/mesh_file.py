@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.ansys import refuse_ansys
 from warpjld.files.archive import check_archive
 from warpjld.files.input_file import check_input
 from warpjld.files.reading import reading
@@ -109,6 +110,7 @@ def _by_trimesh(path: Path) -> MeshFile:
     kind = path.suffix.lower().lstrip(".")
     if kind not in trimesh.available_formats():
         raise InputError(f"{kind.upper()} files need packages that trimesh reads them with: save as STL, OBJ or PLY")
+    refuse_ansys(path)
     if kind == "3mf":
         check_archive(path)
     # not load_scene, which trimesh 4.5 does not have yet

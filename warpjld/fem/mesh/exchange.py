@@ -10,6 +10,7 @@ import numpy as np
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.files.ansys import refuse_ansys
 
 __all__ = ["read_volume_mesh"]
 
@@ -39,6 +40,7 @@ def read_volume_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
         raise MissingExtraError("reading volume meshes", "mesh") from error
     if not path.is_file():
         raise InputError("no such file", path=path)
+    refuse_ansys(path)
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):  # meshio prints what is wrong, and exits
