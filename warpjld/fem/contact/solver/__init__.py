@@ -29,7 +29,7 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
    ``damping`` adds a fraction of the stiffness at rest (Levenberg–Marquardt). A body without Dirichlet conditions gets
    a small artificial stiffness until contact resists all its rigid motions (``unconstrained.grasped``).
    A search that does not come near (|R| above 0.3 of the forces for 10 iterations; 0.05 for 20 if bodies are held by
-   contact alone) is abandoned.
+   contact alone), or whose |R| has not become less for 12 iterations (if none is held by contact alone), is abandoned.
 3. Step length along Δu (``contact_newton``): limited by the search distance of contact, and such that elements keep a
    fifth of their Jacobian determinants (``line_search.length_upright``); in the alternating phase also by 5.
 4. ``newton_state.advance``: λ by (5); contact points searched again; forces by (2), (3).

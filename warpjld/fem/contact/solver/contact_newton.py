@@ -40,6 +40,10 @@ searches in grasps none would have been abandoned; 381 of 1,615 futile iteration
 by contact alone: forces on them are small, and balance last."""
 _LOST, _NEAR = 20, 0.05
 """The same for bodies held by contact alone; searches beyond that seldom converge, and shorter steps take fewer."""
+_STALLED, _LESS = 12, 0.9
+"""Iterations after which a search is abandoned if the relative residual has not fallen below the second number times
+its least value meanwhile. Of 49 converged searches in grasps none waited for more than 6; those that ended at the limit
+of iterations had waited for 29 and more. Not used for bodies held by contact alone."""
 
 
 class ContactNewton:
@@ -103,7 +107,7 @@ class ContactNewton:
         unconstrained = self._unconstrained(step.prescribed)
         self._solver.begin()
         self._damping.begin()
-        falls, nearest = 0, np.inf
+        falls, nearest, least, stalled = 0, np.inf, np.inf, 0
         for turn in range(self.most):
             state.assemble()
             if state.balanced():
@@ -111,12 +115,14 @@ class ContactNewton:
                     return SolveStatus.CONVERGED, state.equilibrium()
                 if state.restarts > _RESTARTS:
                     break
+                least, stalled = np.inf, 0
                 continue
             if not np.isfinite(state.unbalanced):
                 return SolveStatus.NOT_FINITE, None
             nearest = min(nearest, state.unbalanced)
             turns, near = (_LOST, _NEAR) if unconstrained else (_HOPELESS, _FAR)
-            if turn >= turns and nearest > near:
+            least, stalled = (state.unbalanced, 0) if state.unbalanced < _LESS * least else (least, stalled + 1)
+            if (turn >= turns and nearest > near) or (stalled >= _STALLED and not unconstrained):
                 break
             state.linearise()
             done = self._solved(state, unconstrained)
