@@ -110,6 +110,7 @@ def test_a_thigh_behind_the_palm_is_no_palm(figure: Rig) -> None:
     assert np.linalg.norm(middle - palm.middle) < 0.03
 
 
+@pytest.mark.slow
 def test_a_place_inside_the_body_is_not_entered(anny: Scene) -> None:
     """In the thigh: the hand stays outside, and it is said how far away."""
     scene = _fresh(anny)

@@ -148,7 +148,7 @@ def mesh_arrays(mesh: Any, node: Any, number: dict[int, int], notes: list[str]) 
     return out
 
 
-def texture_of(mesh: Any) -> str:
+def texture_file(mesh: Any) -> str:
     """File of the base colour texture of a mesh with one material, as the file names it; "" without one."""
     materials = elements(mesh.materials)
     if len(materials) != 1:
@@ -236,7 +236,7 @@ def main(path: str, out: str, animated: str, name: str, rate: str, memory: str) 
         mesh = taken(node.mesh)
         if mesh is not None and len(mesh.vertices):
             arrays |= {f"{len(meshes)}.{k}": v for k, v in mesh_arrays(mesh, node, number, notes).items()}
-            meshes.append({"name": node.name or mesh.name, "node": n, "texture": texture_of(mesh)})
+            meshes.append({"name": node.name or mesh.name, "node": n, "texture": texture_file(mesh)})
     settings = scene.settings
     told: dict[str, Any] = {
         "names": [node.name for node in nodes],
