@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import WarpjldError
 from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.quality.small_programs import largest_last
 from warpjld.grasp.quality.wrenches import contact_wrenches, has_full_rank
 
 __all__ = ["Closure", "closure_margins", "force_closure"]
 
 # tolerance of the HiGHS solver; a smaller margin could be a rounding error
 _MARGIN = 1e-7
-_NEGATIVE = 1e-9  # coefficients of a basic solution below 0 by no more than this are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def closure_margins(
 ) -> NDArray[np.float64]:
     """``margin`` of ``force_closure`` for many grasps of one object, 0 where it is not force closed, shape (G,).
 
-    Their linear programs are solved together by a kernel (``warpjld_kernels.even_shares``); the solution is then that
+    Their linear programs are solved together by a kernel (`largest_last`); the solution is then that
     of the optimal basis. Programs that it does not solve go to HiGHS.
     """
     out = np.zeros(len(grasps))
@@ -89,47 +89,11 @@ def closure_margins(
             if has_full_rank(own):
                 kept.append(g)
                 wrenches.append(own)
-    for g, own, least in zip(kept, wrenches, _least_shares(wrenches), strict=True):
+    solved = largest_last([_equations(own) for own in wrenches])
+    for g, own, least in zip(kept, wrenches, solved, strict=True):
         margin = own.shape[1] * (_even_combination(own)[1] if least is None else least)
         out[g] = margin if margin > _MARGIN else 0.0
     return out
-
-
-def _least_shares(programs: Sequence[NDArray[np.float64]]) -> list[float | None]:
-    """Largest minimum t of coefficients for each set of wrenches (6, k); None where the kernel did not solve it."""
-    import warp as wp
-    from warpjld_kernels.even_shares import ROWS, even_shares
-
-    if not programs:
-        return []
-    counts = [own.shape[1] for own in programs]
-    basis = np.zeros((len(programs), ROWS), dtype=np.int32)
-    status = np.zeros(len(programs), dtype=np.int32)
-    arrays = (
-        (np.concatenate([own.T.ravel() for own in programs]), wp.float64),
-        (np.cumsum([0, *counts]).astype(np.int32), wp.int32),
-        (np.empty((len(programs), ROWS * (max(counts) + 2))), wp.float64),
-        (basis, wp.int32),
-        (status, wp.int32),
-    )
-    given = [wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in arrays]
-    wp.launch(even_shares, len(programs), inputs=given[:3], outputs=given[3:], device="cpu")
-    return [
-        0.0 if ended == 0 else _of_basis(own, columns) if ended > 0 else None
-        for own, columns, ended in zip(programs, basis, status, strict=True)
-    ]
-
-
-def _of_basis(wrenches: NDArray[np.float64], basis: NDArray[np.int32]) -> float | None:
-    """The minimum t in the basic solution; None where that is not feasible."""
-    equal = _equations(wrenches)
-    try:
-        values = np.linalg.solve(equal[:, basis], np.r_[np.zeros(6), 1.0])
-    except np.linalg.LinAlgError:
-        return None
-    if values.min() < -_NEGATIVE:
-        return None
-    return float(values[basis == wrenches.shape[1]].sum())
 
 
 def _equations(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:

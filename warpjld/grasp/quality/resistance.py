@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError, WarpjldError
 from warpjld.grasp.quality.contacts import Contacts
+from warpjld.grasp.quality.small_programs import largest_last
 from warpjld.grasp.quality.wrenches import contact_wrenches
 
 __all__ = ["resisted_wrench"]
@@ -28,7 +29,7 @@ def resisted_wrench(
 
         maximise λ   subject to   Σ α_k w_k + λ w = 0,   Σ α_k ≤ budget,   α_k ≥ 0
 
-    over the primitive wrenches w_k (HiGHS). With w a unit force it is the weight [N] held in that direction.
+    over the primitive wrenches w_k. With w a unit force it is the weight [N] held in that direction.
 
     Args:
         contacts: C contacts.
@@ -45,8 +46,6 @@ def resisted_wrench(
         InputError: A wrench of another shape, zero or not finite, or a budget that is not positive.
         WarpjldError: The linear program stopped.
     """
-    from scipy.optimize import linprog
-
     load = np.asarray(wrench, dtype=np.float64)
     if load.shape != (6,) or not np.isfinite(load).all() or not load.any():
         raise InputError(f"wrench: want six finite numbers that are not all zero, got {wrench!r}")
@@ -55,6 +54,16 @@ def resisted_wrench(
     if not len(contacts):
         return 0.0
     wrenches = np.concatenate(contact_wrenches(contacts, center, torque_scale, edges), axis=1)
+    # in parts of the budget, of which one variable is left over
+    rows = [np.vstack([wrenches, np.ones(wrenches.shape[1])]), np.eye(7)[:, 6:], np.r_[load, 0.0][:, None]]
+    (most,) = largest_last([np.concatenate(rows, axis=1)])
+    return budget * most if most is not None else _by_highs(wrenches, load, budget)
+
+
+def _by_highs(wrenches: NDArray[np.float64], load: NDArray[np.float64], budget: float) -> float:
+    """The linear program for primitive wrenches (6, k) by HiGHS."""
+    from scipy.optimize import linprog
+
     count = wrenches.shape[1]
     cost = np.zeros(count + 1)
     cost[count] = -1.0

@@ -1,7 +1,7 @@
-"""Linear programs of force closure, many small ones at once: the combination of wrenches whose least share is largest.
+"""Linear programs of seven equations, many at once, for force closure and resisted wrenches.
 
-For wrenches w_1 … w_k: maximise t subject to Σ (t + β_j) w_j = 0, k t + Σ β_j = 1, t ≥ 0, β ≥ 0; by the two-phase
-simplex method on a dense tableau of seven rows (Dantzig 1963), whose right-hand sides are perturbed against cycling.
+For columns a_1 … a_n: maximise x_n subject to Σ x_j a_j = (0, 0, 0, 0, 0, 0, 1), x ≥ 0; by the two-phase simplex method
+on a dense tableau (Dantzig 1963), whose right-hand sides are perturbed against cycling.
 """
 
 import warp as wp
@@ -18,37 +18,31 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
 @wp.func_native(
     f"""
-    const int R = {ROWS}, columns = count + 1, width = count + 2;  // shares, the least of all, right-hand side
+    const int R = {ROWS}, last = count - 1, width = count + 1;  // columns, right-hand side
     double* t = room.data + size_t(row) * room.shape[1];
     int* own = basis.data + size_t(row) * R;
     for (int r = 0; r < R; ++r) {{
-        double sum = 0.0;
-        for (int j = 0; j < count; ++j) {{
-            const double x = r < 6 ? wrenches.data[6 * (size_t(first) + j) + r] : 1.0;
-            t[r * width + j] = x;
-            sum += x;
-        }}
-        t[r * width + count] = sum;
-        t[r * width + columns] = (r < 6 ? 0.0 : 1.0) + {_SHAKE} * (1.0 + 0.37 * r);
+        for (int j = 0; j < count; ++j) t[r * width + j] = columns.data[R * (size_t(first) + j) + r];
+        t[r * width + count] = (r < 6 ? 0.0 : 1.0) + {_SHAKE} * (1.0 + 0.37 * r);
         own[r] = -1;  // an artificial variable
     }}
     int artificial = R;
     for (int pivot = 0; pivot < {_PIVOTS}; ++pivot) {{
-        // what enters: most infeasibility taken away, then most gained for the least share
+        // what enters: most infeasibility taken away, then most gained
         int enters = -1, held = -1;
         double gain = {_LEAST};
-        for (int r = 0; r < R; ++r) if (own[r] == count) held = r;
-        for (int j = 0; j < columns; ++j) {{
+        for (int r = 0; r < R; ++r) if (own[r] == last) held = r;
+        for (int j = 0; j < count; ++j) {{
             double by = 0.0;
             if (artificial) {{
                 for (int r = 0; r < R; ++r) if (own[r] < 0) by += t[r * width + j];
-            }} else by = held < 0 ? (j == count ? 1.0 : 0.0) : (j == count ? 0.0 : -t[held * width + j]);
+            }} else by = held < 0 ? (j == last ? 1.0 : 0.0) : (j == last ? 0.0 : -t[held * width + j]);
             if (by > gain) {{ gain = by; enters = j; }}
         }}
         if (enters < 0) {{
             if (!artificial) return 1;
             double left = 0.0;
-            for (int r = 0; r < R; ++r) if (own[r] < 0) left += t[r * width + columns];
+            for (int r = 0; r < R; ++r) if (own[r] < 0) left += t[r * width + count];
             return left > 1e-7 ? 0 : -1;
         }}
         int leaves = -1;
@@ -56,7 +50,7 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 1})
         for (int r = 0; r < R; ++r) {{
             const double by = t[r * width + enters];
             if (by <= {_LEAST}) continue;
-            const double ratio = t[r * width + columns] / by;
+            const double ratio = t[r * width + count] / by;
             if (ratio < least) {{ least = ratio; leaves = r; }}
         }}
         if (leaves < 0) return -1;
@@ -75,20 +69,20 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 """
 )
 def solve_program(
-    wrenches: wp.array(dtype=wp.float64),
+    columns: wp.array(dtype=wp.float64),
     first: int,
     count: int,
     row: int,
     room: wp.array2d(dtype=wp.float64),
     basis: wp.array2d(dtype=wp.int32),
 ) -> int:
-    """1 where the program is solved, 0 where no combination vanishes, −1 where rounding or cycling ended the search."""
+    """1 where the program is solved, 0 where it has no solution, −1 where rounding or cycling ended the search."""
 
 
 @wp.kernel
-def even_shares(
-    # wrenches of all programs, six numbers each, those of a program one after another
-    wrenches: wp.array(dtype=wp.float64),
+def solve_programs(
+    # columns of all programs, seven numbers each, those of a program one after another
+    columns: wp.array(dtype=wp.float64),
     first_of: wp.array(dtype=wp.int32),
     # scratch, a row a program
     room: wp.array2d(dtype=wp.float64),
@@ -96,7 +90,7 @@ def even_shares(
     basis_out: wp.array2d(dtype=wp.int32),
     status_out: wp.array(dtype=wp.int32),
 ):
-    """Variables of the optimal basis of every program, the least share's last of all, and its status."""
+    """Columns of the optimal basis of every program, and its status as of ``solve_program``."""
     row = wp.tid()
     first = first_of[row]
-    status_out[row] = solve_program(wrenches, first, first_of[row + 1] - first, row, room, basis_out)
+    status_out[row] = solve_program(columns, first, first_of[row + 1] - first, row, room, basis_out)
