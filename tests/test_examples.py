@@ -98,6 +98,7 @@ def test_pressing(name: str, tmp_path) -> None:
         "press_fist.jld": 34,
         "press_pinch.jld": 32,
         "press_plate.jld": 18,
+        "press_weak.jld": 8,
     }[name]
     scene.first, scene.last = last - 2, last
     scene.contact.pressing = replace(scene.contact.pressing, last=last)
