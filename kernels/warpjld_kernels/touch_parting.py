@@ -8,7 +8,7 @@ from warpjld_kernels.touch_samples import Samples
 
 wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
-_LANES = 8
+_LANES = 8  # vertices computed at once
 
 NEARLY = wp.constant(0.6)  # share of the deepest probe's depth above which vertices near a probe are tested too
 HOLDS = wp.constant(4.0)  # factor of a pair's separated share in the weight of its planes, up to a weight of 1

@@ -14,7 +14,7 @@ __all__ = ["PlannedFlesh"]
 
 Array = NDArray[np.float64]
 
-_BLOCK = 16_384
+_BLOCK = 16_384  # points evaluated at once
 _BETWEEN_FINGERS = 1.6  # blending radius between fingers [mm of the design hand]
 _FINGER_ROOT = 9.0  # blending radius at the roots of fingers [mm of the design hand]
 _THUMB_ROOT = 16.0  # blending radius at the thumb and muscles [mm of the design hand]

@@ -15,8 +15,8 @@ from warpjld.skeleton import CHANNELS, poses_from_angles
 __all__ = ["pose_sheet"]
 
 _CELL = (96, 112)  # pixels
-_COLUMNS = 4
-_VERTICES = 1500
+_COLUMNS = 4  # pictures side by side
+_VERTICES = 1500  # of the hand that is drawn: enough at this size
 _SIDE: Literal["left"] = "left"
 _PALM, _FINGERS = (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
 """Directions in which the palm and the fingers of the hand point."""

@@ -12,7 +12,7 @@ from warpjld.files.whole_file import whole_file
 __all__ = ["note_recent", "recent_scripts"]
 
 _FILE = "studio-recent.json"
-_MOST = 8
+_MOST = 8  # scripts that are listed
 
 
 def recent_scripts() -> list[Path]:

@@ -22,7 +22,7 @@ from warpjld.studio.surfaces import Coloring, Shown, Surfaces
 __all__ = ["StudioState"]
 
 _SHORTEST = 48  # frames of the timeline where there are hardly any keys
-_MESSAGES = 100
+_MESSAGES = 100  # kept for the pane of messages
 
 
 class StudioState:

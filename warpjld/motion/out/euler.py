@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 __all__ = ["ContinuousEuler"]
 
 _LOCKED = 1e-7  # cosine of the middle angle below which the others are not determined separately (gimbal lock)
-_TURN = 2.0 * np.pi
+_TURN = 2.0 * np.pi  # rad
 
 
 class ContinuousEuler:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["GhostsPanel"]
 
 _COLORS = {"before": "#4c78a8", "after": "#e07b39"}
-_OPACITY = 0.18
+_OPACITY = 0.18  # 0 transparent, 1 opaque
 _INSET = 4e-4  # m
 
 

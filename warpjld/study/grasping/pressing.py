@@ -8,7 +8,7 @@ from warpjld.files.toml_table import TomlTable
 
 __all__ = ["ContactPlan", "read_pressing"]
 
-_TOLERANCE = 0.1
+_TOLERANCE = 0.1  # of the force asked for: a trial within it has reached it
 
 
 @dataclass(frozen=True)
