@@ -112,7 +112,7 @@ def test_a_users_command_has_a_menu_entry_with_a_form(window: Window) -> None:
     form = page.get_by_role("dialog")
     form.get_by_text("Bend the index finger.").wait_for()
     form.get_by_label("fast").check()
-    line = form.locator("input").first
+    line = form.locator("textarea").first
     until(lambda: line.input_value() == "TRICK LEFT 0 FAST", "the form shows its line")
     form.get_by_role("button", name="Do it").click()
     until(lambda: round(bend(state)) == 60, "the command is done")
@@ -297,5 +297,6 @@ def test_calibration_writes_parameters_and_changes_the_surface_seen(window: Wind
     moved = np.linalg.norm(state.shown()[0].vertices - old, axis=1)
     assert moved.max() > 1e-4
     until(lambda: int((window.pixels() != before).any(axis=-1).sum()) > 50, "the changed skin is drawn")
+    window.tab("Script")
     window.press("undo")
     until(lambda: "PARAMETERS" not in state.document.text, "it is undone")
