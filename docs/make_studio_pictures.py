@@ -19,6 +19,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from warpjld.runtime.quiet import silence_warp
+from warpjld.script.menus import MENUS
 from warpjld.studio.opening import opened_document
 from warpjld.studio.room import Room
 
@@ -90,6 +91,25 @@ def menu(page: Any, room: Room) -> None:
     page.get_by_role("dialog").wait_for()
 
 
+def menus(page: Any, room: Room) -> None:
+    """Every menu, expanded."""
+    page.get_by_role("tab", name="Menus", exact=True).click()
+    for name in MENUS:
+        page.get_by_text(name, exact=True).last.click()
+
+
+def skin(page: Any, room: Room) -> None:
+    """Objects and parameters of the skin, expanded."""
+    page.get_by_text("Objects", exact=True).last.click()
+    page.get_by_text("Skin at a joint", exact=True).click()
+    page.get_by_text("Skin at a joint", exact=True).scroll_into_view_if_needed()
+
+
+def work(page: Any, room: Room) -> None:
+    """Files and jobs."""
+    page.get_by_role("tab", name="Work", exact=True).click()
+
+
 def press(page: Any, room: Room) -> None:
     """Pressure on a fingertip, seen from below."""
     page.get_by_role("tab", name="Work", exact=True).click()
@@ -115,6 +135,9 @@ def main() -> None:
         "grasps": (BALL, grasps),
         "script": (CURL, script),
         "keys": (CURL, keys),
+        "menus": (CURL, menus),
+        "skin": (BALL, skin),
+        "work": (CURL, work),
         "studio_press": (PLATE, press),
     }
     names = sys.argv[1:]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.studio.conftest import Window, until
+from warpjld.geometry.normals import vertex_normals
 from warpjld.script import all_commands
 from warpjld.script.plugin import load_commands
 from warpjld.script.staging import stage
@@ -111,7 +112,7 @@ def test_a_users_command_has_a_menu_entry_with_a_form(window: Window) -> None:
     form = page.get_by_role("dialog")
     form.get_by_text("Bend the index finger.").wait_for()
     form.get_by_label("fast").check()
-    line = form.locator("input").first
+    line = form.locator("textarea").first
     until(lambda: line.input_value() == "TRICK LEFT 0 FAST", "the form shows its line")
     form.get_by_role("button", name="Do it").click()
     until(lambda: round(bend(state)) == 60, "the command is done")
@@ -137,6 +138,24 @@ def test_two_windows_show_the_same_and_a_closed_one_or_a_reload_loses_nothing(wi
     assert abs(float(value) - bend(state)) < 0.5
 
 
+@SLOW
+@pytest.mark.parametrize("width", [700, 1300])
+def test_the_first_view_shows_the_whole_hand_in_windows_narrow_and_wide(
+    browser: Any, studio: Window, width: int
+) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 800})
+    other = Window(page, studio.room)
+
+    def inside() -> bool:
+        pixels = other.pixels()
+        skin = pixels[..., 0] > pixels[..., 2] + 15
+        border = skin[:2].any() or skin[-2:].any() or skin[:, :2].any() or skin[:, -2:].any()
+        return bool(skin.sum() > 1000 and not border)
+
+    until(inside, "the hand is seen as a whole")
+    page.close()
+
+
 def test_the_page_asks_nothing_of_other_machines(browser: Any, studio: Window) -> None:
     page = browser.new_page()
     asked: list[str] = []
@@ -148,6 +167,28 @@ def test_the_page_asks_nothing_of_other_machines(browser: Any, studio: Window) -
     host = studio.room.address.removeprefix("http://")
     assert len(asked) >= 2
     assert all(url.split("://")[-1].startswith(host.rstrip("/")) or url.startswith(("data:", "blob:")) for url in asked)
+
+
+NORMALS = """() => {
+  let found = null;
+  const large = one => one.isMesh && one.geometry.attributes.normal?.count > 1000;
+  __viserMutable.scene.traverse(one => { if (large(one)) found ??= one; });
+  return [found.geometry.computeVertexNormals.toString().includes("area"), ...["position", "normal"].map(
+    name => [...found.geometry.attributes[name].array])];
+}"""
+
+
+@SLOW
+def test_the_pages_own_normals_are_those_of_the_surface(window: Window) -> None:
+    state = window.room.state
+    window.drag_slider("base flexion", 0.9)
+    window.still()
+    (shown,) = state.shown()
+    ours, places, normals = window.page.evaluate(NORMALS)
+    assert ours
+    assert np.allclose(np.reshape(places, (-1, 3)), shown.vertices, atol=1e-6)
+    wanted = vertex_normals(shown.vertices, shown.faces)
+    assert np.abs(np.reshape(normals, (-1, 3)) - wanted).max() < 1e-3
 
 
 def index_tip(state: StudioState) -> np.ndarray:
@@ -235,3 +276,27 @@ def test_a_cancelled_solve_ends_and_the_next_is_seen_in_colours_though_the_page_
         return int(((pixels[..., 1] > 120) & (pixels[..., 0] < 0.5 * pixels[..., 1])).sum()) > 20
 
     until(green, "contact points are seen on it")
+
+
+@SLOW
+def test_calibration_writes_parameters_and_changes_the_surface_seen(window: Window) -> None:
+    state, path = window.room.state, window.room.state.document.path
+    window.drag_slider("base flexion", 0.9)
+    before = window.still()
+    assert state.actor is not None
+    old = state.shown()[0].vertices.copy()
+    window.tab("Work")
+    window.press("Calibrate the skin")
+    until(lambda: "PARAMETERS" in state.document.text, "the skin is calibrated", timeout=600)
+    assert window.room.worker.settle()
+    assert state.error is None
+    assert any("is fitted: loss" in line for line in state.messages)
+    written = path.with_name(f"{path.stem}-{state.actor.name.lower()}.json")
+    assert written.exists()
+    assert state.document.text.splitlines()[-1] == f'PARAMETERS "{written.name}"'
+    moved = np.linalg.norm(state.shown()[0].vertices - old, axis=1)
+    assert moved.max() > 1e-4
+    until(lambda: int((window.pixels() != before).any(axis=-1).sum()) > 50, "the changed skin is drawn")
+    window.tab("Script")
+    window.press("undo")
+    until(lambda: "PARAMETERS" not in state.document.text, "it is undone")

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from warpjld.errors import MissingExtraError
 from warpjld.page.colored_glb import colored_glb
+from warpjld.page.first_view import FIELD
 from warpjld.page.guard import RequestGuard, guarding
 from warpjld.page.visible_side import visible_side
 
-__all__ = ["FIELD", "add_colored", "add_surface", "guarded_server", "look", "rgb", "stop"]
-
-FIELD = 0.6
-"""Vertical field of view of the camera [rad]."""
+__all__ = ["add_colored", "add_surface", "guarded_server", "rgb", "stop"]
 
 
 def guarded_server(guard: RequestGuard, port: int, purpose: str) -> Any:
@@ -78,18 +76,6 @@ def add_colored(
 ) -> Any:
     """Add a surface with vertex colours; adding it again replaces it."""
     return server.scene.add_glb(name, colored_glb(vertices, faces, colors), cast_shadow=False, receive_shadow=False)
-
-
-def look(server: Any, points: NDArray[np.floating], direction: tuple[float, float, float] = (0.45, 0.75, 0.5)) -> None:
-    """Set the camera of every window so that points (n, 3) fill the view from a direction."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    centre = (low + high) / 2.0
-    away = float(np.linalg.norm(high - low)) / 2.0 / np.tan(FIELD / 2.0) * 1.1
-    eye = centre + away * np.array(direction) / np.linalg.norm(direction)
-    server.initial_camera.position, server.initial_camera.look_at = tuple(eye), tuple(centre)
-    for client in server.get_clients().values():
-        with client.atomic():
-            client.camera.position, client.camera.look_at = eye, centre
 
 
 def rgb(color: str) -> tuple[int, int, int]:

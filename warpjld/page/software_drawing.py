@@ -10,6 +10,8 @@ from __future__ import annotations
 import gzip
 from typing import Any
 
+from warpjld.page.quick_normals import QUICK_NORMALS
+
 __all__ = ["add_to_page"]
 
 _SCRIPT = """<script>
@@ -60,7 +62,7 @@ _SCRIPT = """<script>
 
 
 def add_to_page(response: Any, known: dict[bytes, bytes]) -> None:
-    """Put the script into the head of an HTTP response that is viser's page; others are left as they are.
+    """Put this script and ``QUICK_NORMALS`` into the head of an HTTP response that is viser's page; leave others.
 
     Args:
         response: Response of ``websockets``.
@@ -71,7 +73,7 @@ def add_to_page(response: Any, known: dict[bytes, bytes]) -> None:
     packed = response.headers.get("Content-Encoding") == "gzip"
     if response.body not in known:
         page = (gzip.decompress(response.body) if packed else response.body).replace(
-            b"<head>", b"<head>\n" + _SCRIPT.encode(), 1
+            b"<head>", b"<head>\n" + (_SCRIPT + QUICK_NORMALS).encode(), 1
         )
         known[response.body] = gzip.compress(page) if packed else page
     response.body = known[response.body]

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.page.first_view import look
 from warpjld.page.guard import RequestGuard
-from warpjld.page.server import add_colored, add_surface, guarded_server, look, stop
+from warpjld.page.server import add_colored, add_surface, guarded_server, stop
 
 __all__ = ["SurfaceView", "ViewedSurface"]
 

@@ -24,7 +24,7 @@ _OF_GROUP = {
 }
 _OF_COMMAND = {
     **dict.fromkeys(("OBJECT", "OBJECTS", "MOVE", "TURN", "DEFORM"), "Objects"),
-    **dict.fromkeys(("CAMERA", "SIZE"), "View"),
+    **dict.fromkeys(("CAMERA", "SIZE", "LIGHT", "BACKDROP", "COLOR", "SHOT"), "View"),
     **dict.fromkeys(("HELP", "SHOW"), "Help"),
 }
 

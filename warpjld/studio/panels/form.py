@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["FormWindow"]
 
 _NONE = "—"
+_SHOWN = 34  # characters of a way's title that the list shows; longer ones are written out below it
 
 
 class FormWindow:
@@ -39,9 +40,10 @@ class FormWindow:
         self._modal = client.gui.add_modal(name)
         with self._modal:
             self._gui.add_markdown(about)
-            self._line = self._gui.add_text("line", "", hint="what is done; it can be edited")
+            self._line = self._gui.add_text("line", "", multiline=True, hint="what is done; it can be edited")
             titles = tuple(self._ways)
             self._way = self._gui.add_dropdown("way", titles, initial_value=titles[0]) if len(titles) > 1 else None
+            self._title = self._gui.add_markdown("", visible=False)
             self._folder = self._gui.add_folder("values")
             self._said = self._gui.add_markdown("")
             do, cancel = self._gui.add_button("Do it"), self._gui.add_button("Cancel")
@@ -58,6 +60,10 @@ class FormWindow:
         for control in self._made:
             control.remove()
         self._made, self._controls = [], {}
+        if self._way is not None:
+            title: str = self._way.value
+            self._title.visible = len(title) > _SHOWN
+            self._title.content = f"`{self._name} {title}`"
         with self._folder:
             self._add(self._chosen().fields, ())
         self._show()
@@ -77,7 +83,9 @@ class FormWindow:
                     self._keep(here, self._value(field))
 
     def _value(self, field: TextField) -> Any:
-        label = field.label if not field.suffixes else f"{field.label} ({', '.join(field.suffixes)})"
+        # without their dots, which are places where a label's line may break
+        endings = ", ".join(suffix.removeprefix(".") for suffix in field.suffixes)
+        label = f"{field.label} ({endings})" if endings else field.label
         names = known_names(field, self._room.state.scene)
         if names:
             return self._gui.add_dropdown(label, tuple(names), initial_value=names[0])
@@ -99,7 +107,7 @@ class FormWindow:
         self._line.value = self._written()
 
     def _do(self) -> None:
-        line = self._line.value
+        line = " ".join(self._line.value.splitlines())  # its field has several rows, but a command is one line
 
         def job() -> None:
             if self._room.state.do(line):

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpjld.page.server import add_colored, add_surface, look, rgb
+from warpjld.page.first_view import look
+from warpjld.page.server import add_colored, add_surface, rgb
 from warpjld.render.style import Style
 from warpjld.studio.surfaces import COLORINGS, Shown
 
