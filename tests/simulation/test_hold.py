@@ -25,6 +25,7 @@ from warpjld.simulation.bodies.model import ContactModel, PairOwners
 from warpjld.simulation.bodies.object_body import build_object_body
 from warpjld.simulation.grip.hold import HandTrials
 from warpjld.simulation.grip.search import GripStatus, TrialOutcome, gentlest_grip
+from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.specification import GripSpecification
 
 WEIGHT, FRICTION = 0.6, 0.5
@@ -58,7 +59,7 @@ class Squeeze:
 
     def __init__(self, model: ContactModel) -> None:
         self.model, self.hand, self.history = model, model.hands[0], History()
-        self.time = 1.0
+        self.time, self.budget = 1.0, SearchBudget()
         self._closed: dict[float, ContactSolution] = {}
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
@@ -135,6 +136,24 @@ def test_the_gentlest_grip_takes_the_block_from_its_foot(lift: HandTrials) -> No
     force = sum(touch.force for touch in instant.touches)
     np.testing.assert_allclose(force, [0.0, 0.0, -WEIGHT], atol=1e-3 * WEIGHT)
     assert not instant.reactions[lift.weight.handle].any()
+
+
+def test_a_search_ends_with_its_linear_solves(lift: HandTrials) -> None:
+    solves = 8
+    lift.budget = SearchBudget(solves)
+    found = gentlest_grip(
+        lift,
+        5e-5,
+        1e-3,
+        weight=WEIGHT,
+        friction=FRICTION,
+        tolerance=1e-4,
+        exhausted=lambda: lift.budget.exhausted,
+    )
+    assert found.status is GripStatus.EXHAUSTED, (found.status, found.ended)
+    assert lift.budget.exhausted
+    assert lift.budget.spent < solves + 10  # an equilibrium may end some solves late: damping repeats one
+    assert found.text.startswith(GripStatus.EXHAUSTED.value)
 
 
 def test_a_block_with_a_floor_below_stands_on_it(lift: HandTrials) -> None:

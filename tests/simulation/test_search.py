@@ -139,6 +139,26 @@ def _interrupted(grip: float) -> Trial:
     raise KeyboardInterrupt
 
 
+def test_what_held_is_returned_when_the_linear_solves_are_spent() -> None:
+    block, tried = squeezed(2.0, 0.5), []
+
+    def hold(grip: float) -> Trial:
+        tried.append(block(grip))
+        return tried[-1]
+
+    rest = {"weight": 2.0, "friction": 0.5, "tolerance": 1e-6}
+    found = gentlest_grip(hold, 0.0, 0.05, exhausted=lambda: tried[-1].held, **rest)
+    assert found.status is GripStatus.HELD_SO_FAR
+    assert found.trial is tried[-1]
+    weak = Trial(TrialOutcome.WEAK, 1.0, 3.0, 0.8, capacity=0.8)
+    unsolved = Trial(TrialOutcome.UNSOLVED, math.nan, 4.0)
+    ahead = [weak, unsolved]
+    nothing = gentlest_grip(lambda grip: ahead.pop(0), 0.0, 0.05, exhausted=lambda: not ahead, **rest)
+    assert nothing.status is GripStatus.EXHAUSTED
+    assert [trial for _, trial in nothing.trials] == [weak, unsolved]
+    assert nothing.trial is weak
+
+
 def test_trials_have_a_budget() -> None:
     found = gentlest_grip(squeezed(2.0, 0.5), 0.0, 0.05, weight=2.0, friction=0.5, tolerance=1e-6, most=5)
     assert len(found.trials) == 5

@@ -77,6 +77,8 @@ def test_tolerances(body: Body, name: str, value: float) -> None:
 def test_halvings(body: Body) -> None:
     with pytest.raises(InputError, match="halvings: want 0 or more, got -1"):
         press(body, symmetric(body.mesh), [Pair("outer", lid(0.1))], halvings=-1)
+    with pytest.raises(InputError, match="solves: want 0 or more, got -1"):
+        press(body, symmetric(body.mesh), [Pair("outer", lid(0.1))], solves=-1)
 
 
 def test_labels() -> None:

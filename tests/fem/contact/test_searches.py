@@ -9,7 +9,7 @@ import pytest
 
 from tests.fem.contact.bodies import lid
 from warpjld.fem import Body, LinearElastic, box_hexes, prescribe
-from warpjld.fem.contact import Pair
+from warpjld.fem.contact import Pair, press
 from warpjld.fem.contact.interface.contact_area import contact_modulus
 from warpjld.fem.contact.interface.contact_interface import interfaces_of
 from warpjld.fem.contact.law.contact_state import initial_state
@@ -106,3 +106,32 @@ def test_one_that_goes_round_is_ended_and_stays_careful(monkeypatch: pytest.Monk
     monkeypatch.setattr(NewtonState, "confirmed", confirmed)
     assert case.find()[1] is None
     assert careful == [True, True, True]
+
+
+def test_steps_that_fail_again_after_each_halving_come_to_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seven halvings in a row are allowed, but a success makes room for another: only the bound ends such a run."""
+    usual = ContactNewton.find
+
+    def find(self: ContactNewton, u: Any, states: Any, step: LoadStep, *guesses: Any) -> Any:
+        if step.time - step.before > 0.01:
+            self.solves += 40
+            return SolveStatus.INDEFINITE, None
+        return usual(self, u, states, step, *guesses)
+
+    monkeypatch.setattr(ContactNewton, "find", find)
+    case = Pressed()
+    found = press(case.body, case.step.prescribed, [Pair("z+", lid(0.1))], check=False)
+    assert found.status is SolveStatus.EXHAUSTED
+    assert 600 <= found.spent - sum(found.steps) < 640
+    assert "600 were spent in vain; the last failure: the stiffness is not positive definite" in found.message
+
+
+def test_a_run_ends_with_its_linear_solves() -> None:
+    case = Pressed()
+    pairs, times = [Pair("z+", lid(0.1))], [0.25, 0.5, 0.75, 1.0]
+    whole = press(case.body, case.step.prescribed, pairs, times=times)
+    assert whole.spent == sum(whole.steps) > 4
+    short = press(case.body, case.step.prescribed, pairs, times=times, solves=whole.spent - 1, check=False)
+    assert short.status is SolveStatus.EXHAUSTED
+    assert short.spent == whole.spent - 1
+    assert 1 <= len(short.instants) < 4

@@ -39,6 +39,7 @@ def press(
     guess: Guess | None = None,
     watch: Callable[[ContactInstant], str | None] | None = None,
     halvings: int | None = None,
+    solves: int | None = None,
     check: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
@@ -64,6 +65,8 @@ def press(
         guess: Predictor of the displacement.
         watch: Called after each instant; a returned text ends the run with ``SolveStatus.STOPPED`` (R118).
         halvings: Most successive halvings of a failing load step; by default 7, or 3 for an unheld body.
+        solves: Most linear solves of the run, after which it ends with ``SolveStatus.EXHAUSTED``; by default only those
+            in vain are bounded, for each time. Not used by ``paper``.
         check: Whether to raise if the last time is not reached, instead of returning the status.
         progress: Called with a line of text after each instant.
 
@@ -79,16 +82,18 @@ def press(
         raise InputError(f"after: was found with {len(after.states)} pairs, not {len(pairs)}")
     if method not in ("augmented", "paper"):
         raise InputError(f"method: want augmented or paper, got '{method}'")
-    if halvings is not None and halvings < 0:
-        raise InputError(f"halvings: want 0 or more, got {halvings}")
+    for name, most in (("halvings", halvings), ("solves", solves)):
+        if most is not None and most < 0:
+            raise InputError(f"{name}: want 0 or more, got {most}")
     if method == "paper":
         solution = by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, guess, watch, progress)
     else:
-        steps = LoadSteps(body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess, halvings)
+        known = (body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
+        steps = LoadSteps(*known, halvings, solves)
         solution = steps.run(watch, progress)
         last = solution.last
-        known = (body.mesh.nodes, steps.interfaces, steps.moduli, steps.passing)
-        for words in unresolved(*known, last, steps.allowed(last.time)):
+        sides = (body.mesh.nodes, steps.interfaces, steps.moduli, steps.passing)
+        for words in unresolved(*sides, last, steps.allowed(last.time)):
             warnings.warn(words, ContactWarning, stacklevel=3)
     warn_of_rotation(body, solution.last.displacement)
     if check and not solution.converged and solution.status is not SolveStatus.STOPPED:

@@ -31,6 +31,7 @@ class SolveStatus(Enum):
     UNHELD = "a body is not constrained"
     BLOCKED = "bodies overlap where both sides are prescribed"
     PASSED = "bodies would pass through each other, or overlap so far that contact cannot separate them"
+    EXHAUSTED = "the linear solves allowed were not enough"
     STOPPED = "stopped as asked"
 
 

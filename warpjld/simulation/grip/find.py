@@ -40,7 +40,7 @@ _PRESSES = 0.01
 """Force relative to that of the strongest digit above which a digit counts as pressing: flesh between two digits
 transmits a little to both."""
 
-_HELD = (GripStatus.HELD, GripStatus.HELD_AT_ONCE)
+_HELD = (GripStatus.HELD, GripStatus.HELD_AT_ONCE, GripStatus.HELD_SO_FAR)
 """Statuses of a successful search."""
 _COLUMNS = (
     *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
@@ -183,13 +183,14 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: C
         return trial
 
     start = min(_START, most)
-    found = gentlest_grip(hold, 0.0, most, weight=heavy, friction=friction, start=start, tolerance=_NEAR, most=_TRIALS)
+    known = {"weight": heavy, "friction": friction, "start": start, "tolerance": _NEAR}
+    found = gentlest_grip(hold, 0.0, most, **known, most=_TRIALS, exhausted=lambda: squeeze.budget.exhausted)
     taken = trials.taken(found.grip) if found.status in _HELD else None
     instant = squeeze.closed(found.grip).last if taken is None else taken[1]
     text = f"{heavy:.3g} N of {request.object}: {found.text}"
     if taken is not None:
         text += f"; the digits close on by {math.degrees(found.grip):.2f}°"
-    text += f"; {found.ended}"
+    text += f"; {found.ended}, with {squeeze.budget.spent} linear solves"
     effort = squeeze.effort(found.grip, instant) if instant.touches else None
     rows = [
         _row(request, grip, trial, grip == found.grip, found.status.name)

@@ -21,6 +21,7 @@ from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.grip.lower import Lowering, lower_object
 from warpjld.simulation.grip.search import Trial, TrialOutcome
+from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.shared_weight import SharedWeight
 from warpjld.simulation.grip.squeeze import Squeeze
 from warpjld.simulation.solve.branch import solve_branch
@@ -44,14 +45,15 @@ class WeightTrials(ABC):
         weight: The object's weight, shared by hand and handle.
         body: Hand and object, merged.
         pairs: Contact pairs.
+        budget: Linear solves of all trials.
 
     Attributes:
         found: Equilibria of every grip tried, with all load steps.
         lowered: Descent of the object at every grip whose pressures could bear it.
     """
 
-    def __init__(self, weight: SharedWeight, body: Body, pairs: Sequence[Pair]) -> None:
-        self.weight, self.body, self.pairs = weight, body, list(pairs)
+    def __init__(self, weight: SharedWeight, body: Body, pairs: Sequence[Pair], budget: SearchBudget) -> None:
+        self.weight, self.body, self.pairs, self.budget = weight, body, list(pairs), budget
         self.found: dict[float, ContactSolution] = {}
         self.lowered: dict[float, Lowering] = {}
         self._begun: dict[float, float] = {}
@@ -187,7 +189,7 @@ class HandTrials(WeightTrials):
         holding = [k for k, owner in enumerate(model.owners) if owner.other(one.name) == squeeze.hand.name]
         nodes = np.arange(self._span.start, self._span.stop)
         weight = SharedWeight(model.body, nodes, model.pairs, holding, model.loads.gravity)
-        super().__init__(weight, model.body, model.pairs)
+        super().__init__(weight, model.body, model.pairs, squeeze.budget)
 
     def closed(self, grip: float) -> ContactSolution:
         """Equilibrium with the joints flexed by the grip."""
@@ -246,7 +248,11 @@ class HandTrials(WeightTrials):
         """Equilibrium in one step after another, with the hand fixed at a grip and given conditions of the object."""
         model, history = self.squeeze.model, self.squeeze.history
         moves, conditions = self.squeeze.stays(grip), (self._one.name, known)
-        return solve_branch(model, history, after, 1, moves=moves, known=conditions, nodal=nodal, halvings=halvings)
+        most = self.budget.next
+        found = solve_branch(
+            model, history, after, 1, moves=moves, known=conditions, nodal=nodal, halvings=halvings, solves=most
+        )
+        return self.budget.counted(found)
 
     def _at(self, height: float) -> Prescribed:
         """Dirichlet condition of the handle's height, in the object's own node numbering."""

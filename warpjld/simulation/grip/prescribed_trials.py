@@ -16,6 +16,7 @@ from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.simulation.grip.hold import WeightTrials
+from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.shared_weight import SharedWeight
 
 __all__ = ["PrescribedTrials"]
@@ -41,6 +42,7 @@ class PrescribedTrials(WeightTrials):
         loads: Loads that act from the start, as the pressure inside an object.
         others: Contact pairs of the object with other bodies; what these bear, the hand does not hold.
         share: Largest load share of the muscles at an instant, and who has it.
+        budget: Linear solves that all trials may take; by default those of a grip in a script.
 
     Raises:
         InputError: No pairs, no such object, or gravity not along one axis.
@@ -57,6 +59,7 @@ class PrescribedTrials(WeightTrials):
         loads: Loads | None = None,
         others: Sequence[Pair] = (),
         share: Callable[[ContactInstant], tuple[float, str]] | None = None,
+        budget: SearchBudget | None = None,
     ) -> None:
         if not pairs:
             raise InputError("pairs: want one that may hold the object")
@@ -69,7 +72,9 @@ class PrescribedTrials(WeightTrials):
         self._closed: dict[float, ContactSolution] = {}
         own = np.unique(mesh.elements[mesh.regions == mesh.region_names.index(name)])
         touching = [*pairs, *others]
-        super().__init__(SharedWeight(body, own, touching, range(len(pairs)), gravity), body, touching)
+        super().__init__(
+            SharedWeight(body, own, touching, range(len(pairs)), gravity), body, touching, budget or SearchBudget()
+        )
 
     def closed(self, grip: float) -> ContactSolution:
         """Equilibrium at the grip without gravity."""
@@ -127,7 +132,7 @@ class PrescribedTrials(WeightTrials):
         after: ContactSolution | None = None,
         halvings: int | None = None,
     ) -> ContactSolution:
-        return press(
+        found = press(
             self.body,
             known,
             self.pairs,
@@ -135,5 +140,7 @@ class PrescribedTrials(WeightTrials):
             times=[time],
             after=after,
             halvings=halvings,
+            solves=self.budget.next,
             check=False,
         )
+        return self.budget.counted(found)

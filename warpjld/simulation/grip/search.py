@@ -62,6 +62,8 @@ class GripStatus(Enum):
     STANDS = "it stands on something else, and the hand does not hold it"
     LIMIT = "does not hold at the firmest grip that was allowed"
     NO_SOLUTION = "contact could not be solved"
+    EXHAUSTED = "no grip that holds was found with the linear solves allowed"
+    HELD_SO_FAR = "held, but not by the gentlest grip for certain: the linear solves allowed were spent"
     INTERRUPTED = "the search was interrupted before a grip was found"
 
 
@@ -143,6 +145,7 @@ def gentlest_grip(
     start: float | None = None,
     tolerance: float = 0.02,
     most: int = _TRIALS,
+    exhausted: Callable[[], bool] = lambda: False,
 ) -> Grip:
     """Smallest grip in ``low`` … ``high`` that holds.
 
@@ -157,6 +160,8 @@ def gentlest_grip(
         start: First step above ``low`` without contact; by default a sixteenth of the range.
         tolerance: Tolerance of the smallest grip, relative to the force.
         most: Most trials; after that the smallest grip that held is returned.
+        exhausted: Whether the linear solves allowed are spent, asked after every trial; then the smallest grip that
+            held is returned, or else the one that came nearest.
 
     Returns:
         The grip found; if Ctrl-C ends the search, the trials so far with ``GripStatus.INTERRUPTED``.
@@ -172,7 +177,7 @@ def gentlest_grip(
     search = _Search(hold, Bracket(low, high, 1.0 + 0.5 * tolerance, step), tolerance)
     needed = weight / friction if friction else np.inf
     try:
-        return search.run(needed, most)
+        return search.run(needed, most, exhausted)
     except KeyboardInterrupt:
         return search.interrupted()
 
@@ -185,7 +190,7 @@ class _Search:
         self._aim = bracket.target
         self.trials: list[tuple[float, Trial]] = []
 
-    def run(self, needed: float, most: int) -> Grip:
+    def run(self, needed: float, most: int, exhausted: Callable[[], bool]) -> Grip:
         bracket, grip = self._bracket, self._bracket.low
         while len(self.trials) < most:
             trial = self._hold(grip)
@@ -197,6 +202,8 @@ class _Search:
                 status = _given_up(self.trials, grip >= bracket.high, needed)
                 if status is not None:
                     return self._ended(status, grip, trial)
+            if exhausted():
+                return self.exhausted()
             ahead = bracket.next()
             if ahead is None or self._narrow():
                 break
@@ -209,6 +216,14 @@ class _Search:
         if held:
             return self._ended(GripStatus.HELD, *min(held, key=lambda one: one[0]))
         return self._ended(otherwise, *self.trials[-1])
+
+    def exhausted(self) -> Grip:
+        """The smallest grip that held; if none did, the solved one that friction would have let bear the most."""
+        held = [one for one in self.trials if one[1].held]
+        if held:
+            return self._ended(GripStatus.HELD_SO_FAR, *min(held, key=lambda one: one[0]))
+        nearest = max(self.trials, key=lambda one: np.nan_to_num(one[1].able, nan=-1.0))
+        return self._ended(GripStatus.EXHAUSTED, *nearest)
 
     def interrupted(self) -> Grip:
         """Result with the trials so far."""

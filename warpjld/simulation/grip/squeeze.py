@@ -15,6 +15,7 @@ from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.sensitivity.effort_slope import DigitSlope, EffortTangent
 from warpjld.simulation.sensitivity.parameters import angles_perturbed
@@ -44,6 +45,7 @@ class Squeeze:
     Attributes:
         model, history, hand: As given.
         time: Time of the initial equilibrium [frames].
+        budget: Linear solves left to the search.
     """
 
     def __init__(
@@ -58,7 +60,7 @@ class Squeeze:
         self.model, self.history, self.hand = model, history, hand
         self._joints, self._limits = list(joints), limits
         self._start = hand.bones.angles(after.last.time)
-        self.time = after.last.time
+        self.time, self.budget = after.last.time, SearchBudget()
         self._closed: dict[float, ContactSolution] = {0.0: after}
 
     @property
@@ -83,7 +85,9 @@ class Squeeze:
             return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self.time)
 
         steps = self.hand.bones.steps([(self.angles(end), self.time) for end in (before, grip)], TRAVEL)
-        found = solve_branch(self.model, self.history, self._closed[before], steps, moves=(self.hand.name, moves))
+        closing, most = (self.hand.name, moves), self.budget.next
+        found = solve_branch(self.model, self.history, self._closed[before], steps, moves=closing, solves=most)
+        self.budget.counted(found)
         if found.converged:
             self._closed[grip] = found
         return found

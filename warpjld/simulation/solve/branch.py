@@ -37,6 +37,7 @@ def solve_onward(
     method: str = "augmented",
     aitken: bool = False,
     halvings: int | None = None,
+    solves: int | None = None,
 ) -> ContactSolution:
     """Solve equilibria at ascending times from a previous solution, or from rest.
 
@@ -49,6 +50,7 @@ def solve_onward(
         method: Solution method, see ``press``.
         aitken: Whether the paper's loop uses Aitken relaxation.
         halvings: Most halvings of a load step; by default as many as ``press`` allows.
+        solves: Most linear solves; by default as many as ``press`` allows.
 
     Returns:
         The solution; its status says whether the last time was reached.
@@ -65,6 +67,7 @@ def solve_onward(
         tolerance=_TOLERANCE,
         guess=lambda before, time, displacement: model.guess(before, time, displacement, history),
         halvings=halvings,
+        solves=solves,
         check=False,
     )
 
@@ -80,6 +83,7 @@ def solve_branch(
     nodal: Callable[[float], NDArray[np.float64]] | None = None,
     duration: float | None = None,
     halvings: int | None = None,
+    solves: int | None = None,
 ) -> ContactSolution:
     """Solve equilibria along a trial branch; its functions take the branch parameter, 0 … 1.
 
@@ -93,6 +97,7 @@ def solve_branch(
         nodal: Additional nodal forces [N], shape (N, 3).
         duration: Duration of the branch [frames]; None: the animation stands still.
         halvings: Most halvings of a load step; a small number gives up early where there may be no equilibrium.
+        solves: Most linear solves.
     """
     begin = after.last.time
     length = steps * _MOMENT if duration is None else duration
@@ -119,4 +124,4 @@ def solve_branch(
         objects[name] = replace(objects[name], other=lambda time: prescribed(share(time)))
     aside = replace(model, hands=tuple(hands.values()), objects=tuple(objects.values()))
     times = [begin + length * (k + 1) / steps for k in range(steps)]
-    return solve_onward(aside, history, after, times, loads=loads, halvings=halvings)
+    return solve_onward(aside, history, after, times, loads=loads, halvings=halvings, solves=solves)

@@ -163,6 +163,7 @@ class ContactSolution:
         correction_rate: Deviation of the last step from its predictor per unit of time [m], shape (N, 3); None if not
             known.
         last_step: Start of the step that found the last instant; None if not known.
+        spent: Linear solves of the run, those in vain included.
     """
 
     status: SolveStatus
@@ -173,6 +174,7 @@ class ContactSolution:
     loads: Loads
     correction_rate: Array | None = None
     last_step: LastStep | None = None
+    spent: int = 0
 
     @property
     def converged(self) -> bool:

@@ -60,6 +60,7 @@ class ContactNewton:
         solves: Number of linear solves so far.
         iterations: Number of their iterations.
         most: Most Newton iterations of a search.
+        allowed: Number of linear solves from which on a search ends.
         failure: Reason why no equilibrium was found; empty if not known.
     """
 
@@ -68,7 +69,7 @@ class ContactNewton:
     ) -> None:
         self.body = body
         self.solves = self.iterations = 0
-        self.failure, self.most = "", _ITERATIONS
+        self.failure, self.most, self.allowed = "", _ITERATIONS, np.inf
         self._accuracy = {"tolerance": tolerance, "penetration": penetration}
         self._free: tuple[bytes, UnconstrainedBodies] | None = None
         self._elastic = Elastic(body)
@@ -124,6 +125,8 @@ class ContactNewton:
             least, stalled = (state.unbalanced, 0) if state.unbalanced < _LESS * least else (least, stalled + 1)
             if (turn >= turns and nearest > near) or (stalled >= _STALLED and not unconstrained):
                 break
+            if self.solves >= self.allowed:
+                return SolveStatus.EXHAUSTED, None
             state.linearise()
             done = self._solved(state, unconstrained)
             if done.status in (SolveStatus.INDEFINITE, SolveStatus.NOT_FINITE):

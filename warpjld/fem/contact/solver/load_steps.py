@@ -23,6 +23,7 @@ from warpjld.fem.contact.solver.friction_continuation import continue_in_frictio
 from warpjld.fem.contact.solver.newton_state import Equilibrium
 from warpjld.fem.contact.solver.passing import Passing, guess_jumps
 from warpjld.fem.contact.solver.predicted_motion import PredictedMotion
+from warpjld.fem.contact.solver.solve_budget import SolveBudget
 from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
 from warpjld.fem.load.loads import Loads, external_forces
@@ -80,13 +81,14 @@ class LoadSteps:
         penetration: float,
         guess: Guess | None = None,
         halvings: int | None = None,
+        solves: int | None = None,
     ) -> None:
         self.body = body
         self.times = times
         self.prescribed = prescribed
         self.loads = loads or Loads()
         self.guess = guess
-        self.halvings = halvings
+        self.halvings, self.budget = halvings, SolveBudget(solves)
         self.interfaces = interfaces_of(body.mesh, pairs, body.threads)
         self._reaches = [interface.reach for interface in self.interfaces]
         self.moduli = [contact_modulus(body, interface) for interface in self.interfaces]
@@ -149,12 +151,12 @@ class LoadSteps:
         now, halvings = self.start, 0
         reached: list[ContactInstant] = []
         todo = list(self.times)
-        newton = self.newton
-        solves, iterations, cuts, touches, cut, unstable = 0, 0, 0, 0, 1.0, False
+        newton, budget = self.newton, self.budget
+        cuts, touches, cut, unstable = 0, 0, 1.0, False
         unheld: tuple[float, Array, LoadStep, Equilibrium] | None = None
         while todo:
             target = todo[0]
-            newton.solves, newton.iterations, newton.failure = 0, 0, ""
+            newton.solves, newton.iterations, newton.failure, newton.allowed = 0, 0, "", budget.left
             step = self._step(now, target)
             carried = self._carried(step)
             share, cut = self._share(step, carried, cut, may_cut=cuts < _CUTS)
@@ -176,8 +178,7 @@ class LoadSteps:
             through = "" if found is None else self._through(step, found)
             if through:
                 status, found = SolveStatus.PASSED, None
-            solves += newton.solves
-            iterations += newton.iterations
+            budget.count(newton.solves, newton.iterations, status)
             if found is None and status is SolveStatus.SLIDING:
                 status = self._sliding(step)
             if overlap := self._blocked(step, found):
@@ -186,8 +187,8 @@ class LoadSteps:
             if found is None:
                 halvings += 1
                 unstable = unstable or status is SolveStatus.INDEFINITE
-                if halvings > self._most_halvings(status):
-                    status, reason = self._reason(status, through, unstable)
+                if halvings > self._most_halvings(status) or budget.left <= 0:
+                    status, reason = budget.judged(*self._reason(status, through, unstable))
                     message = f"no equilibrium found after time {now:.4g} (tried {target:.4g}): {reason}"
                     return self._end(status, reached, message, step)
                 report(f"time {target:.3g}: {status.value}; halving the step")
@@ -199,9 +200,10 @@ class LoadSteps:
             halvings = max(0, halvings - 1)
             if target not in self.times:
                 continue
+            solves, iterations = budget.reached()
             reached.append(self._instant(target, found, solves, iterations))
             report(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
-            solves = iterations = touches = 0
+            touches = 0
             if watch and (stop := watch(reached[-1])):
                 return self._end(SolveStatus.STOPPED, reached, stop, step)
         return self._end(SolveStatus.CONVERGED, reached, SolveStatus.CONVERGED.value, step)
@@ -345,4 +347,6 @@ class LoadSteps:
             reached = [ContactInstant(self.start, self.u.reshape(-1, 3), zero, (), 0, 0, 0.0)]
         states, steps = tuple(self.states), tuple(self.steps)
         rate, last = self.correction_rate, self.last_step
-        return ContactSolution(status, tuple(reached), message, states, steps, step.loads, rate, last)
+        return ContactSolution(
+            status, tuple(reached), message, states, steps, step.loads, rate, last, self.budget.spent
+        )

@@ -1,0 +1,46 @@
+"""Bound on the linear solves of a grip search: a search that fails ends after the same trials on any machine."""
+
+from __future__ import annotations
+
+from warpjld.fem.contact import ContactSolution
+
+__all__ = ["SearchBudget"]
+
+_SEARCH = 450
+"""Most linear solves of a search. The gentlest grip of a ball between thumb and index (3-mm flesh, five trials)
+takes about 300; a solve of two digits of 6-mm elements takes a tenth of a second, so that a search that fails ends
+within a minute."""
+_TRIAL = 150
+"""Most linear solves of one equilibrium of a trial, so that others can be tried: found ones took 1 to 25, or
+10 for each of several load steps that close a hand."""
+
+
+class SearchBudget:
+    """Linear solves that a grip search may still take.
+
+    Args:
+        most: Most linear solves of the search.
+        trial: Most linear solves of one equilibrium.
+
+    Attributes:
+        spent: Linear solves so far.
+    """
+
+    def __init__(self, most: int = _SEARCH, trial: int = _TRIAL) -> None:
+        self._most, self._trial = most, trial
+        self.spent = 0
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether nothing is left."""
+        return self.spent >= self._most
+
+    @property
+    def next(self) -> int:
+        """Linear solves that the next equilibrium may take, ≥ 0."""
+        return max(0, min(self._trial, self._most - self.spent))
+
+    def counted(self, solution: ContactSolution) -> ContactSolution:
+        """The solution of an equilibrium, after its linear solves are counted."""
+        self.spent += solution.spent
+        return solution
