@@ -42,7 +42,8 @@ def coarse_hands(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
     def coarse(side: str = "left", resolution: int = 1500, **options: float) -> Rig:
         return kept_hand(side, resolution=min(resolution, 1500), **options)
 
-    for place in ("warpjld.hand.kept.kept_hand", "warpjld.hand.build_hand", "warpjld.build_hand"):
+    # the outer names first: they are looked up in the inner ones when they are first used
+    for place in ("warpjld.build_hand", "warpjld.hand.build_hand", "warpjld.hand.kept.kept_hand"):
         monkeypatch.setattr(place, coarse)
 
 

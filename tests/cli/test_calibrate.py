@@ -105,15 +105,20 @@ def test_targets_for_people(hand: Path, shapes: Path, tmp_path: Path) -> None:
         (["builtin:left", "-o", "nowhere/at/all.json"], "no such folder"),
         (["builtin:left", "--motion", "a.csv"], "but there is no --targets"),
         (["builtin:left", "--targets", "a.npz", "--poses", "3"], "all poses of the file are used"),
-        (["builtin:left", "--targets", "none.npz"], "cannot be read"),
     ],
 )
-@pytest.mark.usefixtures("quick_hands")
 def test_bad_input(arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=message):
         CliRunner().invoke(calibrate_command, arguments, catch_exceptions=False)
     assert not list(tmp_path.iterdir())
+
+
+def test_targets_that_are_not_there(hand: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        CliRunner().invoke(
+            calibrate_command, [str(hand), "--targets", str(tmp_path / "none.npz")], catch_exceptions=False
+        )
 
 
 def test_targets_are_not_overwritten(hand: Path, shapes: Path) -> None:
