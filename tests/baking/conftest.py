@@ -17,4 +17,4 @@ def covering(bound: Covering) -> Covering:
 @pytest.fixture(scope="session")
 def baked(covering: Covering, hands: dict[str, Rig]) -> Baked:
     rig = hands["left"]
-    return bake(rig, covering, training_poses(rig.skeleton, random=120), correctives=16)
+    return bake(rig, covering, training_poses(rig.skeleton), correctives=16)
