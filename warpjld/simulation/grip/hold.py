@@ -142,10 +142,12 @@ class WeightTrials(ABC):
         return self.weight.height(last) - self._begun[grip], last
 
     def _trial(self, grip: float, outcome: TrialOutcome, instant: ContactInstant, borne: float) -> Trial:
+        if not instant.touches:  # not one load step of closing was solved
+            return Trial(outcome, float("nan"), 0.0)
         force, sliding = self.weight.force(instant), self.weight.sliding(instant)
         share, who = self.strain(grip, instant)
         note = self.beneath(instant) if outcome is TrialOutcome.STANDS else ""
-        known = outcome is not TrialOutcome.UNSOLVED and bool(instant.touches)
+        known = outcome is not TrialOutcome.UNSOLVED
         capacity = self.weight.most(instant) if known else float("nan")
         rate = self._rate(grip) if capacity > 0.0 else None
         slope = None if rate is None else capacity * rate

@@ -62,6 +62,7 @@ class Squeeze:
         self._start = hand.bones.angles(after.last.time)
         self.time, self.budget = after.last.time, SearchBudget()
         self._closed: dict[float, ContactSolution] = {0.0: after}
+        self._failed: dict[float, ContactSolution] = {}
 
     @property
     def room(self) -> float:
@@ -77,8 +78,8 @@ class Squeeze:
 
     def closed(self, grip: float) -> ContactSolution:
         """Equilibrium at a grip, reached from the largest known one below it; its status tells whether it was found."""
-        if grip in self._closed:
-            return self._closed[grip]
+        if grip in self._closed or grip in self._failed:
+            return self._closed.get(grip) or self._failed[grip]
         before = max(known for known in self._closed if known <= grip + _SAME)
 
         def moves(share: float) -> Moves:
@@ -88,8 +89,7 @@ class Squeeze:
         closing, most = (self.hand.name, moves), self.budget.next
         found = solve_branch(self.model, self.history, self._closed[before], steps, moves=closing, solves=most)
         self.budget.counted(found)
-        if found.converged:
-            self._closed[grip] = found
+        (self._closed if found.converged else self._failed)[grip] = found
         return found
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:

@@ -10,14 +10,15 @@ from warpjld.errors import InputError
 from warpjld.fem.arrays import Array
 from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_area import contact_modulus
-from warpjld.fem.contact.interface.contact_interface import Interface, interfaces_of
+from warpjld.fem.contact.interface.contact_interface import interfaces_of
 from warpjld.fem.contact.interface.pairs import Pair
-from warpjld.fem.contact.law.contact_state import ContactState, initial_state, without_bonds
+from warpjld.fem.contact.law.contact_state import without_bonds
 from warpjld.fem.contact.law.return_mapping import overstrained
 from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution, LastStep
 from warpjld.fem.contact.results.touches import touch_of
 from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
+from warpjld.fem.contact.solver.first_states import first_state
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.friction_continuation import continue_in_friction
 from warpjld.fem.contact.solver.newton_state import Equilibrium
@@ -101,7 +102,7 @@ class LoadSteps:
             self.start = 0.0
             self.u = np.zeros(body.degrees)
             self._extend_search()
-            self.states = [self._begin(interface) for interface in self.interfaces]
+            self.states = [first_state(interface, body.mesh.nodes) for interface in self.interfaces]
         else:
             if after.last.displacement.size != body.degrees:
                 raise InputError(f"after: is of a body with {after.last.displacement.size} degrees of freedom")
@@ -116,19 +117,6 @@ class LoadSteps:
         """Extend the search distance to the depth of initial overlaps, until these are removed."""
         for k, interface in enumerate(self.interfaces):
             interface.reach = max(interface.reach, _FAR * self.passing.depth(self.u, k))
-
-    def _begin(self, interface: Interface) -> ContactState:
-        """Initial state of an interface: bonds made, initial overlaps stored as allowance (R112)."""
-        state = initial_state(len(interface.edge), interface.pair)
-        points = interface.points(self.body.mesh.nodes, 0.0, 0.0)
-        if interface.pair.bond is not None:
-            state.bond_gap[points.sites] = points.gap
-            if len(points.sites) == 0:
-                raise InputError(f"{interface.pair.title}: a bond to nothing: its two sides do not meet")
-            state.bonded[np.isnan(state.bond_gap)] = False
-        else:
-            state.allowance[points.sites] = np.maximum(-points.gap, 0.0)
-        return state
 
     def _step(self, before: float, time: float) -> LoadStep:
         """Load step between two times."""
