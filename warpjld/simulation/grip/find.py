@@ -21,6 +21,7 @@ from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.hold import HandTrials
 from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
+from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.squeeze import Squeeze
 from warpjld.simulation.report.table import csv_cell
 from warpjld.simulation.specification import GripSpecification
@@ -143,7 +144,8 @@ def find_grip(
     """
     hand = next(one for one in model.hands if one.name == request.actor)
     joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in request.channels]
-    squeeze = Squeeze(model, history, hand, joints, after, limits)
+    budget = SearchBudget() if request.lift else None
+    squeeze = Squeeze(model, history, hand, joints, after, limits, budget)
     most = max(min(request.most, squeeze.room), 1e-6)
     found = _gentlest(request, squeeze, most, tell) if request.lift else _firm(request, squeeze, most, tell)
     release = None

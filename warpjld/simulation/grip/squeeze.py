@@ -41,11 +41,12 @@ class Squeeze:
         joints: Indices of the joints that flex.
         after: Initial equilibrium.
         limits: Digit → force limit that differs from the default [N].
+        budget: Linear solves that the search may take; by default without a bound.
 
     Attributes:
         model, history, hand: As given.
         time: Time of the initial equilibrium [frames].
-        budget: Linear solves left to the search.
+        budget: Linear solves so far, and left.
     """
 
     def __init__(
@@ -56,11 +57,12 @@ class Squeeze:
         joints: Sequence[int],
         after: ContactSolution,
         limits: Mapping[str, float] | None = None,
+        budget: SearchBudget | None = None,
     ) -> None:
         self.model, self.history, self.hand = model, history, hand
         self._joints, self._limits = list(joints), limits
         self._start = hand.bones.angles(after.last.time)
-        self.time, self.budget = after.last.time, SearchBudget()
+        self.time, self.budget = after.last.time, budget or SearchBudget(None)
         self._closed: dict[float, ContactSolution] = {0.0: after}
         self._failed: dict[float, ContactSolution] = {}
 
@@ -86,7 +88,7 @@ class Squeeze:
             return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self.time)
 
         steps = self.hand.bones.steps([(self.angles(end), self.time) for end in (before, grip)], TRAVEL)
-        closing, most = (self.hand.name, moves), self.budget.next
+        closing, most = (self.hand.name, moves), self.budget.left
         found = solve_branch(self.model, self.history, self._closed[before], steps, moves=closing, solves=most)
         self.budget.counted(found)
         (self._closed if found.converged else self._failed)[grip] = found
