@@ -136,6 +136,10 @@ def _arguments(path: Path) -> None:
     path.write_text(json.dumps(lines))
 
 
+_LINES = 8
+"""Command lines that are called of a file: damage repeats entries, and each may take as long as an input."""
+
+
 def _called(path: Path) -> object:
     """The command line with these arguments, in the file's folder."""
     try:
@@ -148,7 +152,7 @@ def _called(path: Path) -> object:
     os.chdir(path.parent)
     limits = {name: value for name, value in os.environ.items() if name.startswith("WARPJLD_LIMIT")}
     try:
-        for line in lines:
+        for line in lines[:_LINES]:
             texts = [str(one).replace("\0", "?") for one in line]  # no shell passes zero bytes
             command_group.main(texts, prog_name="warpjld", standalone_mode=False)
     except (click.ClickException, click.exceptions.Exit, click.Abort, OSError) as error:  # as the program tells them

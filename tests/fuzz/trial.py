@@ -26,7 +26,7 @@ def tried(name: str, path: Path) -> str:
         try:
             result = KINDS[name][1](path)
         except WarpjldError as error:
-            if "reader-seconds" in str(error):  # refused in time for the user, but a hang all the same
+            if "not done after" in str(error):  # refused in time for the user, but a hang all the same
                 return str(error)
             return "" if len(str(error)) <= _LONGEST else f"a message of {len(str(error))} characters"
         except Exception:

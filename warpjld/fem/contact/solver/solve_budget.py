@@ -9,8 +9,9 @@ from warpjld.fem.solver.krylov import SolveStatus
 __all__ = ["SolveBudget"]
 
 _IN_VAIN = 600
-"""Most linear solves of failed searches on the way to one requested time. A failure halved seven times in a row takes
-200 to 400; steps that fail, succeed halved, and fail again would otherwise go on without end."""
+"""Most linear solves of failed searches on the way to one requested time: above what a failure halved seven times in a
+row was seen to take (562, fingers without friction side by side); steps that fail, succeed halved, and fail again would
+otherwise go on without end."""
 
 
 class SolveBudget:
