@@ -1,7 +1,9 @@
 """Linear programs of seven equations, many at once, for force closure and resisted wrenches.
 
 For columns a_1 … a_n: maximise x_n subject to Σ x_j a_j = (0, 0, 0, 0, 0, 0, 1), x ≥ 0; by the two-phase simplex method
-on a dense tableau (Dantzig 1963), whose right-hand sides are perturbed against cycling.
+on a dense tableau (Dantzig 1963). Against cycling the right-hand sides are perturbed, by a combination of all columns
+with small positive coefficients: a program that has a solution keeps it, also where Σ x_j a_j cannot reach all
+directions.
 """
 
 import warp as wp
@@ -10,7 +12,7 @@ ROWS = 7
 """Equations of a program."""
 
 _PIVOTS = 400  # more than these, and the program counts as not solved; typical are 20
-_SHAKE = 1e-10  # perturbation of the right-hand sides
+_SHAKE = 1e-10  # perturbation of the variables, all of which are at least minus 0.5 to 1.5 times this
 _LEAST = 1e-10  # smallest pivot, and smallest gain of a step
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
@@ -23,7 +25,14 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 1})
     int* own = basis.data + size_t(row) * R;
     for (int r = 0; r < R; ++r) {{
         for (int j = 0; j < count; ++j) t[r * width + j] = columns.data[R * (size_t(first) + j) + r];
-        t[r * width + count] = (r < 6 ? 0.0 : 1.0) + {_SHAKE} * (1.0 + 0.37 * r);
+        double sum = 0.0, share = 0.0;  // of all columns, each with another share
+        for (int j = 0; j < count; ++j) {{
+            share += 0.6180339887498949;
+            if (share >= 1.0) share -= 1.0;
+            sum += (0.5 + share) * t[r * width + j];
+        }}
+        t[r * width + count] = (r < 6 ? 0.0 : 1.0) + {_SHAKE} * sum;
+        if (t[r * width + count] < 0.0) for (int j = 0; j < width; ++j) t[r * width + j] = -t[r * width + j];
         own[r] = -1;  // an artificial variable
     }}
     int artificial = R;

@@ -191,6 +191,41 @@ def test_the_pages_own_normals_are_those_of_the_surface(window: Window) -> None:
     assert np.abs(np.reshape(normals, (-1, 3)) - wanted).max() < 1e-3
 
 
+COUNT_DRAWN = """() => {
+  window.counted = {frames: 0, drawn: 0};
+  let drawn = false;
+  const original = WebGL2RenderingContext.prototype.drawElements;
+  WebGL2RenderingContext.prototype.drawElements = function (...given) {
+    drawn = true;
+    return original.apply(this, given);
+  };
+  (function frame() {
+    requestAnimationFrame(frame);
+    counted.frames++;
+    counted.drawn += drawn;
+    drawn = false;
+  })();
+}"""
+
+
+@SLOW
+def test_while_a_slider_is_dragged_only_frames_with_news_are_drawn(window: Window) -> None:
+    window.drag_slider("base flexion", 0.2)
+    window.still()
+    before = window.still()
+    window.page.evaluate(COUNT_DRAWN)
+    updates = []
+    set_angles = window.room.state.set_angles
+    window.room.state.set_angles = lambda *given, **named: (updates.append(1), set_angles(*given, **named))[1]
+    window.drag_slider("base flexion", 0.9)
+    window.still()
+    counted = window.page.evaluate("counted")
+    assert window.changed(before) > 300
+    # a picture each update, and while the view comes to rest those of a quarter of a second
+    assert 0 < counted["drawn"] <= len(updates) + 30
+    assert counted["frames"] > counted["drawn"]
+
+
 def index_tip(state: StudioState) -> np.ndarray:
     """Where the tip of the index is [m], shape (3,)."""
     assert state.actor is not None

@@ -183,11 +183,13 @@ def _common_volume(
     low, high = low - 2.0 * h, high + 2.0 * h
     axes = [np.arange(a + h / 2.0, b, h) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    share = np.clip(0.5 - near.near(points, h).distance.astype(np.float64) / h, 0.0, 1.0)
-    points, share = points[share > 0.0], share[share > 0.0]
     part = len(chosen) < len(local)  # the volume of a part: grid cells whose nearest triangle belongs to it
+    # less of the grid lies in the skin than in the object, and a distance to the object takes longer
     to_skin, face = posed.distances(skin, points, np.inf if part else h)
-    share = share * np.clip(0.5 - to_skin / h, 0.0, 1.0)
+    share = np.clip(0.5 - to_skin / h, 0.0, 1.0)
+    kept = share > 0.0
+    points, share, face = points[kept], share[kept], face[kept]
+    share = share * np.clip(0.5 - near.near(points, h).distance.astype(np.float64) / h, 0.0, 1.0)
     if part:
         own = np.isin(covering.surface.faces, chosen).sum(axis=1) >= 2
         share = share * np.where(face < len(own), own[np.minimum(face, len(own) - 1)], False)

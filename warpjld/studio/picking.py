@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpjld.geometry.ray import ray_hit
 from warpjld.geometry.segment_distance import segment_distance
 from warpjld.script.scene import Actor
 from warpjld.studio.surfaces import Shown
@@ -57,21 +58,11 @@ def digit_of(joint: str) -> str | None:
 
 
 def _hit(surface: Shown, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Ray parameter of the first hit (Möller and Trumbore), and the vertex nearest to it; None without a hit."""
+    """Ray parameter of the first hit, and the vertex nearest to it; None without a hit."""
     corners = surface.vertices.astype(np.float64)[surface.faces]
-    a, edge, other = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    across = np.cross(direction, other)
-    determinant = np.einsum("ij,ij->i", edge, across)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        from_a = origin - a
-        u = np.einsum("ij,ij->i", from_a, across) / determinant
-        q = np.cross(from_a, edge)
-        v = (q @ direction) / determinant
-        t = np.einsum("ij,ij->i", other, q) / determinant
-        inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (t > 0.0)
-    if not inside.any():
+    found = ray_hit(corners, origin, direction)
+    if found is None:
         return None
-    face = int(np.argmin(np.where(inside, t, np.inf)))
-    place = origin + t[face] * direction
-    corner = int(np.linalg.norm(corners[face] - place, axis=1).argmin())
-    return float(t[face]), int(surface.faces[face, corner])
+    t, face = found
+    corner = int(np.linalg.norm(corners[face] - (origin + t * direction), axis=1).argmin())
+    return t, int(surface.faces[face, corner])

@@ -7,11 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpjld.grasp import ObjectSet
 from warpjld.grasp.palm import Palm
-from warpjld.grasp.shapes import ball
 from warpjld.study.grasping.plan import WristRange
-from warpjld.study.grasping.wrist import draw_approach, place_palm, touch_along
+from warpjld.study.grasping.wrist import draw_approach, place_palm
 
 PALM = Palm(np.array([0.01, -0.02, -0.06]), np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, -1.0]), 0.08)
 
@@ -50,10 +48,3 @@ def test_elevation_is_where_the_hand_comes_from() -> None:
     rng = np.random.default_rng(1)
     assert draw_approach(above, rng, np.ones(3)).direction == pytest.approx([0, 1, 0], abs=1e-7)
     assert draw_approach(front, rng, np.ones(3)).direction == pytest.approx([0, 0, 1], abs=1e-7)
-
-
-def test_tracing_meets_a_ball_where_it_is() -> None:
-    objects = ObjectSet(ball(0.08, subdivisions=5))
-    way = touch_along(objects, np.array([0.3, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]), 1.0)
-    assert way == pytest.approx(0.26, abs=1e-4)
-    assert touch_along(objects, np.array([0.3, 0.1, 0.0]), np.array([-1.0, 0.0, 0.0]), 1.0) is None

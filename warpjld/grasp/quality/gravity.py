@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError, WarpjldError
-from warpjld.grasp.quality.closure import force_closure
+from warpjld.grasp.quality.closure import Closure, force_closure
+from warpjld.grasp.quality.contact_springs import BALANCED, ContactSprings
 from warpjld.grasp.quality.contacts import Contacts
-from warpjld.grasp.quality.resistance import resisted_wrench
+from warpjld.grasp.quality.resistance import resisted_wrenches
 from warpjld.grasp.quality.wrenches import grasp_matrix
 
 __all__ = ["SIX_DIRECTIONS", "GravityResponse", "gravity_displacement"]
@@ -19,11 +20,6 @@ Array = NDArray[np.float64]
 
 SIX_DIRECTIONS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
 """±x, ±y, ±z, shape (6, 3)."""
-
-# largest residual of the balance, relative to the weight
-_BALANCED = 1e-5
-# stiffness of a regularising spring to the ground, relative to k_n: selects the smallest of undetermined motions
-_GROUND = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +66,7 @@ def gravity_displacement(
     gravity: float = 9.81,
     directions: ArrayLike = SIX_DIRECTIONS,
     edges: int = 8,
+    closure: Closure | None = None,
 ) -> GravityResponse:
     """Displacement of the object when gravity acts along each direction in turn, with the hand fixed.
 
@@ -105,6 +102,7 @@ def gravity_displacement(
         gravity: Acceleration [m/s²].
         directions: Directions gravity acts along, shape (D, 3); normalised here.
         edges: Edges of the friction cones for closure and for deciding whether the object is held.
+        closure: Result of `force_closure` for the same contacts, centre, length and edges, if it is known.
 
     Returns:
         A response per direction.
@@ -128,98 +126,20 @@ def gravity_displacement(
         raise InputError(f"directions: want finite vectors that are not zero, got {directions!r}")
     ways = ways / lengths
     count = len(ways)
-    held = np.zeros(count, dtype=bool)
     motion = np.full((count, 6), np.inf)
     forces = np.full((count, len(contacts), 4), np.nan)
-    residual, lift = np.full(count, np.inf), np.zeros(count)
-    springs = _Springs(contacts, grasp_matrix(contacts, center, torque_scale), stiffness)
-    preload = squeeze * force_closure(contacts, center, torque_scale=torque_scale, edges=edges).forces
+    residual = np.full(count, np.inf)
     weight = mass * gravity
-    for d, way in enumerate(ways):
-        load = weight * np.r_[way, np.zeros(3)]
-        reach = resisted_wrench(contacts, load, center, torque_scale=torque_scale, budget=1e6 * weight, edges=edges)
-        # the program is homogeneous: half the forces hold half the weight
-        lift[d] = max(0.0, reach) * squeeze / (1e6 * weight)
-        if reach < 1.0:
-            continue
-        held[d] = True
-        motion[d], forces[d], residual[d] = springs.balance(preload, load)
-        if residual[d] > _BALANCED:
-            raise WarpjldError(f"gravity: direction {d}: forces are unbalanced by {residual[d]:.1e} of the weight")
+    loads = weight * np.concatenate([ways, np.zeros((count, 3))], axis=1)
+    reach = resisted_wrenches(contacts, loads, center, torque_scale=torque_scale, budget=1e6 * weight, edges=edges)
+    # the program is homogeneous: half the forces hold half the weight
+    lift = np.maximum(0.0, reach) * squeeze / (1e6 * weight)
+    held = reach >= 1.0
+    if held.any():
+        springs = ContactSprings(contacts, grasp_matrix(contacts, center, torque_scale), stiffness)
+        if closure is None:
+            closure = force_closure(contacts, center, torque_scale=torque_scale, edges=edges)
+        motion[held], forces[held], residual[held] = springs.balance(squeeze * closure.forces, loads[held])
+    for d in np.flatnonzero(held & (residual > BALANCED)):
+        raise WarpjldError(f"gravity: direction {d}: forces are unbalanced by {residual[d]:.1e} of the weight")
     return GravityResponse(held, motion[:, :3], motion[:, 3:] / torque_scale, forces, residual, lift)
-
-
-class _Springs:
-    """Contacts as springs behind friction cones; forces scaled by K^-½, so that cones are round."""
-
-    def __init__(self, contacts: Contacts, matrix: Array, stiffness: Array) -> None:
-        count = len(contacts)
-        friction, spin = contacts.friction, contacts.spin
-        roots = np.tile(np.sqrt(stiffness), (count, 1))
-        # (f_t/μ)² + (τ/γ)² ≤ f_n² is round where k_s = k_t (γ/μ)²
-        turns = (spin > 0.0) & (friction > 0.0)
-        roots[turns, 3] = roots[turns, 0] * spin[turns] / friction[turns]
-        self._roots = roots
-        self._slope = friction * roots[:, 2] / roots[:, 0]
-        # G diag(√K), per contact (C, 6, 4)
-        self._map = matrix.reshape(6, count, 4).transpose(1, 0, 2) * roots[:, None, :]
-
-    def balance(self, preload: Array, load: Array) -> tuple[Array, Array, float]:
-        """Motion (6,) [m], forces (C, 4) and relative residual under a load (6,) [N]."""
-        from scipy.optimize import minimize
-
-        safe = np.where(self._roots > 0.0, self._roots, 1.0)
-        start = np.where(self._roots > 0.0, preload / safe, 0.0)
-        weight = float(np.linalg.norm(load))
-        unit = weight / float(self._roots[:, 2].max() ** 2)  # deflection of one spring: scale of the unknowns
-
-        def potential(x: Array) -> tuple[float, Array]:
-            scaled = self._project(start - np.einsum("cij,i->cj", self._map, x * unit))[0]
-            slope = -np.einsum("cij,cj->i", self._map, scaled) - load
-            energy = (0.5 * float((scaled**2).sum()) - float(load @ x) * unit) / (weight * unit)
-            return energy + 0.5 * _GROUND * float(x @ x), slope / weight + _GROUND * x
-
-        def curvature(x: Array) -> Array:
-            turned = self._project(start - np.einsum("cij,i->cj", self._map, x * unit))[1]
-            springs = np.einsum("cij,cjk,clk->il", self._map, turned, self._map)
-            return np.asarray(springs * (unit / weight) + _GROUND * np.eye(6))
-
-        found = minimize(
-            potential,
-            np.zeros(6),
-            jac=True,
-            hess=curvature,
-            method="trust-exact",
-            options={"gtol": 0.01 * _BALANCED, "maxiter": 2000, "max_trust_radius": 1e6},
-        )
-        motion = found.x * unit
-        scaled = self._project(start - np.einsum("cij,i->cj", self._map, motion))[0]
-        residual = np.linalg.norm(np.einsum("cij,cj->i", self._map, scaled) + load) / weight
-        return motion, scaled * self._roots, float(residual)
-
-    def _project(self, forces: Array) -> tuple[Array, Array]:
-        """Projection of scaled forces (C, 4) on their cones |y_t| ≤ m y_n, and its derivative (C, 4, 4)."""
-        tangential, normal, slope = forces[:, (0, 1, 3)], forces[:, 2], self._slope
-        length = np.linalg.norm(tangential, axis=1)
-        along = tangential / np.maximum(length, 1e-300)[:, None]
-        sticks = (length <= slope * normal) & (normal >= 0.0)
-        opens = ~sticks & (slope * length <= -normal)
-        slides = ~sticks & ~opens
-        share = (normal + slope * length) / (1.0 + slope**2)
-        out = np.where(sticks[:, None], forces, 0.0)
-        out[slides, 2] = share[slides]
-        out[np.ix_(slides, (0, 1, 3))] = (slope * share)[slides, None] * along[slides]
-
-        turned = np.zeros((len(forces), 4, 4))
-        turned[sticks] = np.eye(4)
-        edge = np.zeros((len(forces), 4))  # the cone's edge that a sliding force is projected on
-        edge[:, (0, 1, 3)] = slope[:, None] * along
-        edge[:, 2] = 1.0
-        across = np.zeros((len(forces), 4, 4))
-        flat = np.eye(3) - along[:, :, None] * along[:, None, :]
-        across[np.ix_(range(len(forces)), (0, 1, 3), (0, 1, 3))] = flat
-        turned[slides] = (
-            edge[slides, :, None] * edge[slides, None, :] / (1.0 + slope[slides, None, None] ** 2)
-            + (slope * share / np.maximum(length, 1e-300))[slides, None, None] * across[slides]
-        )
-        return out, turned

@@ -10,7 +10,7 @@ from warpjld.grasp.quality.contacts import Contacts
 from warpjld.grasp.quality.small_programs import largest_last
 from warpjld.grasp.quality.wrenches import contact_wrenches
 
-__all__ = ["resisted_wrench"]
+__all__ = ["resisted_wrench", "resisted_wrenches"]
 
 
 def resisted_wrench(
@@ -49,15 +49,33 @@ def resisted_wrench(
     load = np.asarray(wrench, dtype=np.float64)
     if load.shape != (6,) or not np.isfinite(load).all() or not load.any():
         raise InputError(f"wrench: want six finite numbers that are not all zero, got {wrench!r}")
+    given = {"torque_scale": torque_scale, "budget": budget, "edges": edges}
+    return float(resisted_wrenches(contacts, load[None], center, **given)[0])
+
+
+def resisted_wrenches(
+    contacts: Contacts,
+    loads: NDArray[np.float64],
+    center: ArrayLike = (0.0, 0.0, 0.0),
+    *,
+    torque_scale: float = 1.0,
+    budget: float = 1.0,
+    edges: int = 8,
+) -> NDArray[np.float64]:
+    """``resisted_wrench`` for wrenches (D, 6) that are finite and not zero, shape (D,)."""
     if not (np.isfinite(budget) and budget > 0.0):
         raise InputError(f"budget: want a force > 0 [N], got {budget!r}")
     if not len(contacts):
-        return 0.0
+        return np.zeros(len(loads))
     wrenches = np.concatenate(contact_wrenches(contacts, center, torque_scale, edges), axis=1)
     # in parts of the budget, of which one variable is left over
-    rows = [np.vstack([wrenches, np.ones(wrenches.shape[1])]), np.eye(7)[:, 6:], np.r_[load, 0.0][:, None]]
-    (most,) = largest_last([np.concatenate(rows, axis=1)])
-    return budget * most if most is not None else _by_highs(wrenches, load, budget)
+    rows = np.concatenate([np.vstack([wrenches, np.ones(wrenches.shape[1])]), np.eye(7)[:, 6:]], axis=1)
+    found = largest_last([np.concatenate([rows, np.r_[load, 0.0][:, None]], axis=1) for load in loads])
+    most = [
+        _by_highs(wrenches, load, budget) if one is None else budget * one
+        for load, one in zip(loads, found, strict=True)
+    ]
+    return np.array(most)
 
 
 def _by_highs(wrenches: NDArray[np.float64], load: NDArray[np.float64], budget: float) -> float:

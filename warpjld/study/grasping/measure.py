@@ -57,6 +57,7 @@ def measure_grasp(
         normal_stiffness=how.normal_stiffness,
         tangential_stiffness=how.tangential_stiffness,
         edges=how.edges,
+        closure=closure,
     )
     inside = penetration(both, vertices)
     skin_inside = max(inside.skin, float(deepest))

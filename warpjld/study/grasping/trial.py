@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.geometry.ray import ray_hit
 from warpjld.grasp.close import Closer
 from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.hand_scale import doubt_of_size, hand_length
@@ -26,7 +27,7 @@ from warpjld.study.grasping.load import Hand, Thing, closer_of, device_identity,
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
 from warpjld.study.grasping.variety import varieties
-from warpjld.study.grasping.wrist import backed_off, draw_approach, place_palm, touch_along
+from warpjld.study.grasping.wrist import backed_off, draw_approach, place_palm
 from warpjld.tables.columns import Column
 
 __all__ = ["GraspExperiment"]
@@ -238,9 +239,10 @@ class GraspExperiment:
         approach = draw_approach(self.settings.wrist, rng, thing.body.size)
         values = {**_direction(approach.direction), "gap": approach.gap, "tilt": approach.tilt}
         start = approach.aim + 4.0 * thing.radius * approach.direction
-        way = touch_along(thing.objects, start, -approach.direction, 8.0 * thing.radius)
-        if way is None:
+        met = ray_hit(thing.body.vertices[thing.body.faces], start, -approach.direction)
+        if met is None:
             return Outcome("missed", values, message="the line of approach misses the object")
+        way = met[0]
         turn, shift = place_palm(hand.palm, approach, start + (approach.gap - way) * approach.direction)
         posture = self.settings.posture
         opened = opened_hand(choice, posture_for(thing.body.size) if posture == "auto" else posture)

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpjld.grasp import ObjectSet
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.palm import Palm
 from warpjld.study.grasping.plan import WristRange
 
-__all__ = ["Approach", "backed_off", "draw_approach", "place_palm", "touch_along"]
+__all__ = ["Approach", "backed_off", "draw_approach", "place_palm"]
 
 Array = NDArray[np.float64]
 
@@ -63,19 +62,6 @@ def draw_approach(ranges: WristRange, rng: np.random.Generator, extent: Array) -
     level = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
     fingers = Rotation.from_rotvec(roll * direction).apply(level)
     return Approach(direction, aside * extent / 2.0, fingers, float(tilt), float(about), float(gap))
-
-
-def touch_along(objects: ObjectSet, start: Array, direction: Array, reach: float) -> float | None:
-    """Distance along a ray to the object [m], by sphere tracing (Hart 1996); None if it is missed."""
-    travelled = 0.0
-    for _ in range(200):
-        gap = float(objects.distances(start[None] + travelled * direction, threads=1).distance[0, 0])
-        if gap < 1e-5:
-            return travelled
-        travelled += gap
-        if travelled > reach:
-            return None
-    return travelled
 
 
 def place_palm(palm: Palm, approach: Approach, point: Array) -> tuple[Array, Array]:
