@@ -105,8 +105,9 @@ class Window:
         seen = [self.pixels()]
 
         def same() -> bool:
+            fine = self.fine()  # before the picture is taken: else it may be the last coarse one
             seen.append(self.pixels())
-            return self.fine() and bool(np.array_equal(seen[-1], seen[-2]))
+            return fine and bool(np.array_equal(seen[-1], seen[-2]))
 
         until(same, "the canvas is still")
         return seen[-1]

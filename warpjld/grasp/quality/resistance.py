@@ -49,8 +49,8 @@ def resisted_wrench(
     load = np.asarray(wrench, dtype=np.float64)
     if load.shape != (6,) or not np.isfinite(load).all() or not load.any():
         raise InputError(f"wrench: want six finite numbers that are not all zero, got {wrench!r}")
-    given = {"torque_scale": torque_scale, "budget": budget, "edges": edges}
-    return float(resisted_wrenches(contacts, load[None], center, **given)[0])
+    found = resisted_wrenches(contacts, load[None], center, torque_scale=torque_scale, budget=budget, edges=edges)
+    return float(found[0])
 
 
 def resisted_wrenches(
