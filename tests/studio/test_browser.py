@@ -265,6 +265,36 @@ def test_a_click_selects_the_joint_and_a_dragged_fingertip_bends_its_finger(wind
     until(lambda: np.linalg.norm(index_tip(state) - tip) < 1e-9, "it is undone in one step")
 
 
+@SLOW
+def test_a_dragged_wrist_moves_the_hand(window: Window) -> None:
+    state, room, mouse = window.room.state, window.room, window.page.mouse
+
+    def wrist() -> np.ndarray:
+        assert state.actor is not None
+        joint = state.actor.skeleton.names.index("left.wrist")
+        return stage(state.actor, np.array([state.frame]), state.scene.rate).positions[0, joint]
+
+    room.post(lambda: room.drag.take("wrist"))
+    handle = room.server.scene._handle_from_node_name
+    until(lambda: any(name == "/tip" for name in handle), "a handle is on the wrist")
+    before, start = window.still(), wrist()
+    (size,) = [one.scale for name, one in handle.items() if name == "/tip"]
+    grip = start + np.array([0.0, 0.6 * size, 0.0])
+    mouse.move(*window.at(grip))
+    mouse.down()
+    mouse.move(*window.at(grip + np.array([0.0, 0.03, 0.0])), steps=6)
+    mouse.up()
+    until(lambda: np.linalg.norm(wrist() - start) > 0.01, "the wrist is dragged away")
+    assert room.worker.settle()
+    moved = wrist() - start
+    assert moved[1] > 0.9 * np.linalg.norm(moved)
+    assert state.document.text.splitlines()[-1].startswith("MOVE LEFT 0 ")
+    until(lambda: window.changed(before) > 300, "the hand is drawn where it was dragged")
+    room.post(lambda: room.state.undo())
+    assert room.worker.settle()
+    until(lambda: np.linalg.norm(wrist() - start) < 1e-9, "it is undone in one step")
+
+
 PLATE = """HAND LEFT BUILTIN RESOLUTION 1500
 FRAMES 0 10
 OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
