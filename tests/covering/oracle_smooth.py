@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -98,6 +99,7 @@ class Diffused:
         found = covering.following  # what lies on what has tests of its own
         self.bends = heat if found is None else found.bending.toarray() @ heat
         self.heat = heat if found is None else found.follow.toarray() @ heat
+        self._last: tuple[Parameters, list[int], list[Row]] | None = None  # other poses need no other rows
 
     def rows(self, vertices: list[int], parameters: Parameters) -> list[Row]:
         """Coefficients of vertices after diffusion and thinning."""
@@ -116,7 +118,9 @@ class Diffused:
 
     def points(self, vertices: list[int], frames: list[Frame], parameters: Parameters) -> np.ndarray:
         """Positions of vertices in every frame, shape (F, n, 3)."""
-        rows = self.rows(vertices, parameters)
+        if self._last is None or self._last[0] is not parameters or self._last[1] != vertices:
+            self._last = parameters, list(vertices), self.rows(vertices, parameters)
+        rows = self._last[2]
         return np.array([[self.point(r, f, parameters) for r in rows] for f in frames])
 
     def point(self, row: Row, frame: Frame, parameters: Parameters) -> np.ndarray:
@@ -190,21 +194,20 @@ def _heat(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> np.nda
     count, tau = len(vertices), (BETA * radius) ** 2 / 2
     conducted, area = np.zeros((count, count)), np.zeros(count)
     corners = _saddles(vertices, faces, radius)
-    for face in faces:
-        exponent = 0.0  # around a saddle corner of angle θ heat is conducted as r^((2π/θ)² − 1), and a little more so
-        for corner, turns, reach in corners:
-            distance = np.linalg.norm(vertices[face].mean(axis=0) - corner)
-            if distance <= reach:
-                exponent += 1.3 * (turns**-2 - 1) * np.log(distance / reach)
-        better = min(np.exp(exponent), 1e4)
-        for k in range(3):
-            apex, i, j = face[k], face[(k + 1) % 3], face[(k + 2) % 3]
-            u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
-            double = np.linalg.norm(np.cross(u, v))
-            area[apex] += double / 6
-            weight = better * min(max(u @ v / double, 1e-3), 1e3) / 2 * (tau[i] + tau[j]) / 2
-            conducted[i, j] += weight
-            conducted[j, i] += weight
+    exponent = np.zeros(len(faces))  # around a saddle corner of angle θ heat is conducted as r^((2π/θ)² − 1), and more
+    for corner, turns, reach in corners:
+        distance = np.linalg.norm(vertices[faces].mean(axis=1) - corner, axis=1)
+        near = distance <= reach
+        exponent[near] += 1.3 * (turns**-2 - 1) * np.log(distance[near] / reach)
+    better = np.minimum(np.exp(exponent), 1e4)
+    for k in range(3):
+        apex, i, j = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
+        double = np.linalg.norm(np.cross(u, v), axis=1)
+        np.add.at(area, apex, double / 6)
+        weight = better * np.clip((u * v).sum(axis=1) / double, 1e-3, 1e3) / 2 * (tau[i] + tau[j]) / 2
+        np.add.at(conducted, (i, j), weight)
+        np.add.at(conducted, (j, i), weight)
     step = np.linalg.solve(np.diag(area + conducted.sum(axis=1)) - conducted, np.diag(area))
     return np.asarray(step @ step)
 
@@ -212,10 +215,10 @@ def _heat(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> np.nda
 def _saddles(vertices: np.ndarray, faces: np.ndarray, radius: np.ndarray) -> list[tuple[np.ndarray, float, float]]:
     """Vertices whose angles sum to more than 1.03 of a full turn, to how many turns, and how far each reaches."""
     angle = np.zeros(len(vertices))
-    for face in faces:
-        for k in range(3):
-            u, v = (vertices[face[(k + n) % 3]] - vertices[face[k]] for n in (1, 2))
-            angle[face[k]] += np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v))
+    for k in range(3):
+        u, v = (vertices[faces[:, (k + n) % 3]] - vertices[faces[:, k]] for n in (1, 2))
+        lengths = np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
+        np.add.at(angle, faces[:, k], np.arccos((u * v).sum(axis=1) / lengths))
     turns = angle / (2 * np.pi)
     return [(vertices[v], float(turns[v]), 0.4 * radius[v]) for v in np.flatnonzero(turns > 1.03)]
 
@@ -324,6 +327,7 @@ def _operator(skeleton: Skeleton, p: int, d: int, muscle: bool, weight: float, v
     return Operator(p, d, muscle, weight, ratio, side)
 
 
+@cache
 def _normal(skeleton: Skeleton, p: int, d: int, joint: int, other: int) -> np.ndarray:
     """Segment × flexion axis; where an axis lies along the segment, the other joint's (R20)."""
     along = skeleton.rest[d] - skeleton.rest[p]
@@ -344,12 +348,17 @@ def _ratio(skeleton: Skeleton, p: int, d: int, vertex: np.ndarray) -> float:
     return t
 
 
+@cache
+def _longest(skeleton: Skeleton, segments: tuple[tuple[int, int], ...]) -> float:
+    return max(float(np.linalg.norm(skeleton.rest[d] - skeleton.rest[p])) for p, d in segments)
+
+
 def _shares(
     skeleton: Skeleton, segments: list[tuple[int, int]], vertex: np.ndarray, parameters: Parameters
 ) -> list[float]:
     """R of every virtual segment, remapped by the proximities; their sum lies between the two that hold the vertex."""
     ratios = [_ratio(skeleton, p, d, vertex) for p, d in segments]
-    longest = max(np.linalg.norm(skeleton.rest[d] - skeleton.rest[p]) for p, d in segments)
+    longest = _longest(skeleton, tuple(segments))
     passed = 0.0
     for k in range(len(segments) - 1):
         at = ratios[k : k + 2]

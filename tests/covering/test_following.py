@@ -74,7 +74,7 @@ def test_deformation_and_gradients_against_the_oracle(dressed: tuple[Covering, n
     between = default_parameters(covering.skeleton)
     between.proximity[:] = 0.315  # areas that end between two rings: on one, there is no derivative
     covering = covering.with_parameters(between)
-    chosen = np.concatenate([np.flatnonzero(piece == p)[::7] for p in range(3)])
+    chosen = np.concatenate([np.flatnonzero(piece == p)[::14] for p in range(3)])
     poses = bend(covering.skeleton, [25.0, 70.0])
     dense, frames = oracle.Diffused(covering), oracle.frames(covering, poses)
     expected = dense.points(chosen.tolist(), frames, covering.parameters)

@@ -59,7 +59,7 @@ def test_spacing_too_coarse_for_the_fingers() -> None:
         flesh_of(build_hand("left"), 0.009)
 
 
-@pytest.mark.parametrize("spacing", [0.004, 0.005])
+@pytest.mark.parametrize("spacing", [0.005, pytest.param(0.004, marks=pytest.mark.slow)])
 def test_coarse_elements_fill_every_finger(spacing: float) -> None:
     from warpjld.hand.kept import kept_hand
 

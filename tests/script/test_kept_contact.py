@@ -17,8 +17,8 @@ from warpjld.simulation import solve_frames
 from warpjld.simulation.simulate import KEPT
 
 BLOCK = """
-OBJECT block BOX 0.02 0.02 0.02 AT 0 0.0101 0
-OBJECT ground BOX 0.1 0.02 0.1 AT 0 -0.01 0
+OBJECT block BOX 0.02 0.02 0.02 AT 0.5 0.0101 0
+OBJECT ground BOX 0.1 0.02 0.1 AT 0.5 -0.01 0
 PHYSICAL block LAW LINEAR YOUNG 1e5 ELEMENT 0.01
 POINTS block top UPPER Y 0.1
 VECTOR block top AT 0 0 0 0

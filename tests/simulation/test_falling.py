@@ -52,7 +52,7 @@ def bowl(radius: float = 0.06, wall: float = 0.005) -> trimesh.Trimesh:
     profile = np.concatenate([np.stack([np.sin(profile), -np.cos(profile)], axis=1)])
     points = np.concatenate([radius * profile, (radius + wall) * profile[::-1]])
     return trimesh.creation.revolve(
-        points, sections=64, transform=trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0))
+        points, sections=32, transform=trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0))
     )
 
 

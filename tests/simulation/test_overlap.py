@@ -8,7 +8,7 @@ import trimesh
 
 from warpjld.covering import bind
 from warpjld.fem.contact.obstacles.facets import Facets
-from warpjld.fem.hand.flesh_hand import build_flesh_hand
+from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.rig import Rig
 from warpjld.simulation.bodies.skin_parts import SkinParts, skin_parts
 from warpjld.simulation.display.overlap import SurfacePart, self_overlaps
@@ -80,8 +80,7 @@ def test_parts_of_one_ball_are_closed_where_they_part() -> None:
     assert self_overlaps(parts, x, np.asarray(BALL.vertex_normals)) == {}
 
 
-def test_a_hand_overlaps_itself_where_digits_cross(rig: Rig) -> None:
-    hand = build_flesh_hand(rig, 0.004, name="left")
+def test_a_hand_overlaps_itself_where_digits_cross(rig: Rig, hand: FleshHand) -> None:
     covering = bind(rig.skeleton, rig.surface)
     angles = np.zeros((len(rig.skeleton), 4))
     rest = covering.deform(poses_from_angles(rig.skeleton, angles[None]))[0].astype(np.float64)

@@ -18,11 +18,6 @@ from warpjld.skeleton.kinematics import rest_poses
 
 
 @pytest.fixture(scope="module")
-def hand(rig: Rig) -> FleshHand:
-    return build_flesh_hand(rig, 0.004)
-
-
-@pytest.fixture(scope="module")
 def covering(rig: Rig) -> Covering:
     return bind(rig.skeleton, rig.surface)
 
@@ -108,6 +103,7 @@ def test_a_whole_hand_is_its_own_part(hand: FleshHand, rig: Rig) -> None:
     assert part.hand is hand
 
 
+@pytest.mark.slow
 def test_bones_that_crush_flesh_between_them_let_it_go(data: Path) -> None:
     """A pinky bent so far that an element has no room between its phalanges: two or three nodes there are flesh's."""
     rig = load_rig(data / "hand_webxr_generic" / "left.glb")

@@ -23,9 +23,9 @@ from warpjld.simulation.solve.start_frame import find_start
 
 PLATE = """
 OBJECT plate BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165
-MOVE LEFT 0  0  0.002 0
+MOVE LEFT 0  0  0.001 0
 MOVE LEFT 10 0 -0.008 0
-FLESH LEFT INDEX ELEMENT 0.003
+FLESH LEFT INDEX ELEMENT 0.004
 FRAMES 0 8
 """
 

@@ -35,6 +35,14 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One of thirty."""
+    folder = tmp_path_factory.mktemp("calm")
+    run_study(Dice(trials=30), folder, processes=1, table="csv")
+    return folder
+
+
 def test_killed_half_way_and_resumed_with_other_processes_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(_ROOT), str(_ROOT / "kernels")])}
     command = [sys.executable, "-m", "tests.study.dice", str(tmp_path), "1000", "2", "0.002"]
@@ -106,29 +114,24 @@ def test_schema_is_in_the_file_and_wall_clock_is_not(whole: Path) -> None:
     assert float(first.split(",")[5]) == read_table(whole / "table.parquet")[0]["thrown"]
 
 
-def test_a_trial_that_kills_its_worker_is_a_row(tmp_path: Path) -> None:
+def test_a_trial_that_kills_its_worker_is_a_row(calm: Path, tmp_path: Path) -> None:
     run_study(Dice(trials=30, fatal=11), tmp_path, processes=2, table="csv")
-    run_study(Dice(trials=30), tmp_path / "calm", processes=2, table="csv")
-    lines = (tmp_path / "table.csv").read_text().splitlines()
-    calm = (tmp_path / "calm" / "table.csv").read_text().splitlines()
+    lines, others = ((folder / "table.csv").read_text().splitlines() for folder in (tmp_path, calm))
     assert lines[12].startswith('11,"(11,)",crashed,')
-    assert lines[:12] + lines[13:] == calm[:12] + calm[13:]
+    assert lines[:12] + lines[13:] == others[:12] + others[13:]
 
 
-def test_a_worker_killed_from_outside_is_survived(tmp_path: Path) -> None:
+def test_a_worker_killed_from_outside_is_survived(calm: Path, tmp_path: Path) -> None:
     result = run_study(Dice(trials=30, fatal_once=str(tmp_path / "mark")), tmp_path / "a", processes=2, table="csv")
-    run_study(Dice(trials=30), tmp_path / "calm", processes=1, table="csv")
     assert (tmp_path / "mark").exists()
     assert result.ran == 30
-    assert _bytes(tmp_path / "a", ("table.csv", "poses.npz")) == _bytes(tmp_path / "calm", ("table.csv", "poses.npz"))
+    assert _bytes(tmp_path / "a", ("table.csv", "poses.npz")) == _bytes(calm, ("table.csv", "poses.npz"))
 
 
-def test_more_trials_later_keep_the_old_ones(tmp_path: Path) -> None:
-    run_study(Dice(trials=10), tmp_path / "a", processes=1, table="csv")
-    result = run_study(Dice(trials=20), tmp_path / "a", processes=1, table="csv")
-    assert result.ran == 10
-    run_study(Dice(trials=20), tmp_path / "b", processes=1, table="csv")
-    assert _bytes(tmp_path / "a", ("table.csv", "poses.npz")) == _bytes(tmp_path / "b", ("table.csv", "poses.npz"))
+def test_more_trials_later_keep_the_old_ones(calm: Path, tmp_path: Path) -> None:
+    run_study(Dice(trials=10), tmp_path, processes=1, table="csv")
+    assert run_study(Dice(trials=30), tmp_path, processes=1, table="csv").ran == 20
+    assert _bytes(tmp_path, ("table.csv", "poses.npz")) == _bytes(calm, ("table.csv", "poses.npz"))
 
 
 def test_another_study_in_the_folder_is_refused(tmp_path: Path) -> None:

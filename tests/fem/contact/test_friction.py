@@ -16,7 +16,7 @@ GRAVITY = 9.81 * np.array([np.sin(SLOPE), 0.0, -np.cos(SLOPE)])
 
 @pytest.fixture(scope="module")
 def block() -> Body:
-    return Body(box_hexes((0.1, 0.1, 0.05), (4, 4, 2)), LinearElastic(1e6, 0.3))
+    return Body(box_hexes((0.1, 0.1, 0.05), (3, 3, 2)), LinearElastic(1e6, 0.3))
 
 
 def test_friction_of_the_slope_and_a_hundredth_more_holds(block: Body) -> None:

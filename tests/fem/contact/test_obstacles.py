@@ -45,30 +45,32 @@ def cloud(obstacle: Obstacle, time: float, count: int = 2000, seed: int = 0) -> 
     return np.concatenate([wide, surface + 0.003 * size * rng.normal(size=surface.shape)])
 
 
-def triangle_distance(points: NDArray[np.float64], triangle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """To the plane where the foot of the perpendicular lies between the edges, to the nearest edge elsewhere."""
-    normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
-    normal /= np.linalg.norm(normal)
-    inside = np.ones(len(points), dtype=bool)
-    best = np.full(len(points), np.inf)
-    for start, end in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-        along, away = end - start, points - start
-        inside &= np.cross(along, away) @ normal >= 0.0
-        share = np.clip(away @ along / (along @ along), 0.0, 1.0)
+def triangle_distance(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """To the planes where the foot of the perpendicular lies between the edges, to the nearest edge elsewhere."""
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    inside = np.ones(len(triangles), dtype=bool)
+    best = np.full(len(triangles), np.inf)
+    for k in range(3):
+        along, away = triangles[:, (k + 1) % 3] - triangles[:, k], point - triangles[:, k]
+        inside &= (np.cross(along, away) * normal).sum(1) >= 0.0
+        share = np.clip((away * along).sum(1) / (along * along).sum(1), 0.0, 1.0)
         best = np.minimum(best, np.linalg.norm(away - share[:, None] * along, axis=1))
-    return np.where(inside, np.abs((points - triangle[0]) @ normal), best)
+    return np.where(inside, np.abs(((point - triangles[:, 0]) * normal).sum(1)), best)
 
 
 def brute_force(points: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray:
     """Signed distances to all triangles, the sign by the sum of their solid angles."""
-    best, angle = np.full(len(points), np.inf), np.zeros(len(points))
-    for triangle in vertices[faces]:
-        best = np.minimum(best, triangle_distance(points, triangle))
-        a, b, c = triangle[:, None] - points
+    triangles = vertices[faces]
+    found = np.empty(len(points))
+    for k, point in enumerate(points):
+        a, b, c = np.moveaxis(triangles - point, 1, 0)
         la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
         below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
-        angle += 2.0 * np.arctan2((a * np.cross(b, c)).sum(1), below)
-    return np.where(np.abs(angle) > 2.0 * np.pi, -best, best)
+        angle = 2.0 * np.arctan2((a * np.cross(b, c)).sum(1), below).sum()
+        away = triangle_distance(point, triangles).min()
+        found[k] = -away if abs(angle) > 2.0 * np.pi else away
+    return found
 
 
 @pytest.mark.parametrize("name", SOLIDS)

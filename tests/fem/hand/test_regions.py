@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from warpjld.fem import box_hexes
-from warpjld.fem.hand import FleshHand, build_flesh_hand, hand_laws
+from warpjld.fem.hand import FleshHand, hand_laws
 from warpjld.fem.hand.cushion import coarse_note, cushions
 from warpjld.fem.hand.regions import shares_of_skin
 from warpjld.fem.load.loads import volumes
@@ -56,15 +56,12 @@ def test_bones_of_fingers_are_where_they_are_said_to_be(hand: FleshHand) -> None
     assert np.percentile(np.concatenate(away), 80) < 0.3
 
 
-def test_elements_too_large_for_the_flesh_are_told(hand: FleshHand) -> None:
+def test_elements_too_large_for_the_flesh_are_told(hand: FleshHand, coarse: FleshHand) -> None:
     assert coarse_note(cushions(hand), 0.003) is None
     found = {one.segment: one for one in cushions(hand)}
     assert len(found) == 14
     assert found["left.index.distal"].elements == 2
     assert 5e-3 < found["left.index.distal"].depth < 8e-3
-    from warpjld.hand.kept import kept_hand
-
-    coarse = build_flesh_hand(kept_hand("left", resolution=4000), 0.005)
     note = coarse_note(cushions(coarse), 0.005)
     assert note is not None
     assert note.startswith("elements of 5 mm are too large for the flesh over the bones")

@@ -19,7 +19,8 @@ POINTS = CORNERS / np.sqrt(3.0)
 
 def shape_at(points: Array) -> Array:
     """Shape functions N_a at reference points (n, 3), shape (n, 8)."""
-    out: Array = np.prod(1.0 + CORNERS[None] * points[:, None], axis=2) / 8.0
+    h = 1.0 + CORNERS[None] * points[:, None]
+    out: Array = h[..., 0] * h[..., 1] * h[..., 2] / 8.0
     return out
 
 

@@ -38,8 +38,8 @@ def find_branches(solid: VoxelSolid, distance: NDArray[np.float64], least: float
     known = np.flatnonzero(np.isfinite(distance))
     order = known[np.argsort(-distance[known], kind="stable")]
     graph = (solid.graph + solid.graph.T).tocsr()
-    starts, ends = graph.indptr, graph.indices
-    owner = np.full(len(distance), -1)
+    starts, ends = graph.indptr.tolist(), graph.indices.tolist()
+    owner = [-1] * len(distance)
     union_parent: list[int] = []
     peaks: list[int] = []
     own: list[list[int]] = []
@@ -52,7 +52,9 @@ def find_branches(solid: VoxelSolid, distance: NDArray[np.float64], least: float
         return piece
 
     for voxel in order.tolist():
-        pieces = {find_root(p) for p in owner[ends[starts[voxel] : starts[voxel + 1]]].tolist() if p >= 0}
+        around = {owner[other] for other in ends[starts[voxel] : starts[voxel + 1]]}
+        around.discard(-1)
+        pieces = {find_root(piece) for piece in around}
         if not pieces:
             union_parent.append(len(union_parent))
             peaks.append(voxel)

@@ -167,5 +167,5 @@ def _samples(
         chosen = corners[parts == n]
         for start in range(0, len(chosen), max(1, 2_000_000 // len(weights))):
             block = chosen[start : start + max(1, 2_000_000 // len(weights))]
-            out.append(np.einsum("wk,tkx->twx", weights, block).reshape(-1, 3))
+            out.append((weights @ block.transpose(1, 0, 2).reshape(3, -1)).reshape(-1, 3))
     return np.concatenate(out)
