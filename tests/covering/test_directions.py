@@ -9,7 +9,7 @@ from tests.covering import oracle_paper, oracle_smooth
 from warpjld.covering import Parameters, default_parameters
 from warpjld.skeleton import Poses, Skeleton, poses_from_angles
 
-RATIOS = np.linspace(0.0, 1.0, 201)
+RATIOS = np.linspace(0.0, 1.0, 51)
 UP = np.array([0.0, 1.0, 0.0])
 KNUCKLE2, KNUCKLE3 = np.radians([100.0, 80.0])  # the largest angles at the ends of a finger's middle segment
 

@@ -94,7 +94,9 @@ def test_poses_want_their_joints(hands: dict[str, Rig]) -> None:
     assert np.degrees(2.0 * np.arccos(abs(bend[3]))) == pytest.approx(144.0, abs=3.0)
 
 
-@pytest.mark.parametrize("name", ["builtin", *(pytest.param(name, marks=pytest.mark.slow) for name in ("webxr", "godot_low"))])
+@pytest.mark.parametrize(
+    "name", ["builtin", *(pytest.param(name, marks=pytest.mark.slow) for name in ("webxr", "godot_low"))]
+)
 def test_calibration_makes_no_pose_worse(name: str, measuring: Measuring) -> None:
     """Volume, folds and roughness in all poses of the benchmark, most of which are not fitted to."""
     from warpjld.covering.calibrate import calibrate

@@ -51,7 +51,9 @@ def test_built_in_shapes(make) -> None:
     assert_exact(make(), samples(make(), 40))
 
 
-@pytest.mark.parametrize("file", MESHES)
+@pytest.mark.parametrize(
+    "file", [pytest.param(file, marks=pytest.mark.slow if file.startswith("body_") else ()) for file in MESHES]
+)
 def test_real_meshes(data: Path, file: str) -> None:
     thing = load_object(data / file, unit="cm" if "mug" in file else "m")
     assert_exact(thing, samples(thing, max(20, 300_000 // len(thing.faces)) if len(thing.faces) > 3000 else 100))

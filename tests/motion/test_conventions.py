@@ -427,7 +427,7 @@ VARIANTS: dict[str, dict[str, object]] = {
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("name", ["LAFAN1", "MakeHuman"])
+@pytest.mark.parametrize("name", ["LAFAN1", pytest.param("MakeHuman", marks=pytest.mark.slow)])
 def test_rest_axes_and_units_do_not_matter(tmp_path: Path, name: str, variant: str) -> None:
     recording = record(CONVENTIONS[name], **VARIANTS[variant])  # type: ignore[arg-type]
     assert_followed(play(tmp_path, recording), recording)

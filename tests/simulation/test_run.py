@@ -153,9 +153,10 @@ def test_bones_in_a_rigid_object_are_named(run: Callable[[str], Scene], tmp_path
             r"<script>:2:1: A: points P: no point of the object lies there",
         ),
         ("OBJECT a GLASS\nPHYSICAL a ELEMENT 0.01", r"<script>:2:1: A: "),
-        (
+        pytest.param(
             "MOVE LEFT 0 0 0 0\nFLESH left INDEX ELEMENT 0.05",
             r"<script>:2:1: FLESH LEFT: ELEMENT: 0.05 m is too coarse",
+            marks=pytest.mark.slow,  # five sizes are tried
         ),
         ("FLESH left INDEX ELEMENT 0.00005", r"<script>:1:1: FLESH LEFT: ELEMENT: 5e-05 m would make a grid of"),
     ],

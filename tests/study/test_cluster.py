@@ -44,9 +44,9 @@ def workers() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three hundred trials in one process of this machine."""
+    """A hundred trials in one process of this machine."""
     folder = tmp_path_factory.mktemp("whole")
-    run_study(Dice(trials=300), folder, processes=1, table="csv")
+    run_study(Dice(trials=100), folder, processes=1, table="csv")
     return folder
 
 
@@ -74,28 +74,28 @@ def test_stopped_half_way_with_a_worker_killed_and_resumed(whole: Path, tmp_path
     def stop(what: str, done: int, total: int) -> None:
         nonlocal finished
         finished = done
-        if done == 150:
+        if done == 50:
             raise KeyboardInterrupt
 
-    dice = Dice(trials=300, fatal_once=str(tmp_path / "mark"))
+    dice = Dice(trials=100, fatal_once=str(tmp_path / "mark"))
     with pytest.raises(KeyboardInterrupt):
         run_study(dice, tmp_path / "a", table="csv", ray="local", report=stop)
-    assert finished == 150
+    assert finished == 50
     assert not (tmp_path / "a" / "table.csv").exists()
     result = run_study(dice, tmp_path / "a", table="csv", ray="local")
-    assert result.ran == 150
+    assert result.ran == 50
     assert (tmp_path / "mark").exists()  # one worker was killed, by trial 7
     assert _same(tmp_path / "a", whole)
     (node,) = _manifest(tmp_path / "a")["cluster"]["nodes"]
-    assert node["trials"] >= 150
+    assert node["trials"] >= 50
     assert node["cpu"]
     assert node["versions"]["numpy"]
 
 
 @pytest.mark.usefixtures("workers")
 def test_local_workers_go_on_where_ray_stopped(whole: Path, tmp_path: Path) -> None:
-    run_study(Dice(trials=200), tmp_path, table="csv", ray="local")
-    assert run_study(Dice(trials=300), tmp_path, processes=2, table="csv").ran == 100
+    run_study(Dice(trials=70), tmp_path, table="csv", ray="local")
+    assert run_study(Dice(trials=100), tmp_path, processes=1, table="csv").ran == 30
     assert _same(tmp_path, whole)
 
 

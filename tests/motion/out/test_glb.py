@@ -47,7 +47,7 @@ def armature(scale: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["plain", "flat", "matrices", "centimetres", "turned", "mirrored"])
-@pytest.mark.parametrize("grows", [False, True])
+@pytest.mark.parametrize("grows", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_joints_stand_where_they_should(
     write_glb: Callable[..., Path], hand_glb: Callable[..., Any], tmp_path: Path, kind: str, grows: bool
 ) -> None:
