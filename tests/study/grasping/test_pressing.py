@@ -85,6 +85,7 @@ def test_without_contact_a_study_is_what_it_was(tmp_path: Path) -> None:
         ("weights = [5, 10]\n", "", r"contact.weights: is missing"),
         ("[5, 10]", "[5, 0]", r"contact.weights: want .* above 0"),
         ("element = 0.008", "element = 0.8", r"contact.element: want .* up to 0.02"),
+        ("element = 0.008", 'element = 0.008\nshare = "force"', r"contact.share: want one of angles, muscles"),
         ("element", "elements", r"contact.elements: unknown key; did you mean element\?"),
         ("best_of = 32", "palm = true", r"wrist.palm: is for best_of"),
     ],
