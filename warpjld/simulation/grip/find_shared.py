@@ -8,16 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import InputError
 from warpjld.fem.contact import ContactSolution
 from warpjld.fem.hand.limits import force_limits
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.digit_squeeze import DigitSqueeze
 from warpjld.simulation.grip.force import PressedForce
 from warpjld.simulation.grip.found import FoundGrip, digits_that_press, trial_row
 from warpjld.simulation.grip.shared_force import PressedDigits, SharedGrip, share_force
-from warpjld.simulation.specification import GripSpecification
+from warpjld.simulation.specification import GripSpecification, located
 from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["find_shared"]
@@ -37,10 +39,10 @@ def find_shared(
     """Search for the closings at which the digits press with the requested force and equal shares of their muscles."""
     assert request.force is not None
     hand = next(one for one in model.hands if one.name == request.actor)
-    joints: dict[str, list[int]] = {}
+    wanted, joints = _sharing(hand, request), dict[str, list[int]]()
     for joint in (channel.rpartition(".")[0] for channel in request.channels):
         digit = joint.rpartition(".")[0]
-        if not request.digits or digit.rpartition(".")[2] in request.digits:
+        if digit.rpartition(".")[2] in wanted:
             joints.setdefault(digit, []).append(hand.bones.skeleton.index(joint))
     squeeze = DigitSqueeze(model, history, hand, joints, after, limits)
     allowed = force_limits(limits)
@@ -74,6 +76,21 @@ def find_shared(
     text, grip = _text(request.force, list(joints), found), float(found.grips.max())
     edits = edits if found.grips.any() else ()
     return FoundGrip(request, found.status.name, text, grip, None, force, digits_that_press(effort), tuple(rows), edits)
+
+
+def _sharing(hand: FleshBody, request: GripSpecification) -> list[str]:
+    """Digits that share the force: those that were named, or all that close and have flesh to press with.
+
+    Raises:
+        InputError: They have no flesh.
+    """
+    closing = list(dict.fromkeys(channel.split(".")[-3] for channel in request.channels))
+    wanted = [digit for digit in request.digits or closing if hand.has_flesh(digit)]
+    if bare := [digit for digit in request.digits if digit not in wanted]:
+        raise located(InputError(f"{bare[0]} has no flesh that deforms, and so no share of the force"), request.where)
+    if not wanted:
+        raise located(InputError("no digit that closes has flesh that deforms: FLESH gives it"), request.where)
+    return wanted
 
 
 def _text(force: float, digits: Sequence[str], found: SharedGrip) -> str:
