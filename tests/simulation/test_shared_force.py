@@ -101,6 +101,24 @@ def test_a_digit_that_does_not_reach_is_left_out() -> None:
     np.testing.assert_allclose(rest / 20.0, np.delete(STRENGTHS, 2) / np.delete(STRENGTHS, 2).sum(), rtol=0.08)
 
 
+def test_a_digit_that_presses_on_its_neighbour_alone_is_left_out() -> None:
+    """Its force hardly grows however far it bends."""
+    good = pads(np.array([-3e-3, -1e-3, 1.0, -4e-3, -2e-3]))
+
+    def press(grips: Array) -> PressedDigits:
+        found = good(grips)
+        found.shares[2] = 1e-3 * (1.0 + grips[2])
+        found.forces[2] = STRENGTHS[2] * found.shares[2]
+        assert found.slopes is not None
+        found.slopes[2, 2] = 1e-3
+        return found
+
+    found = shared(press, 20.0)
+    assert found.status is ForceStatus.REACHED
+    assert found.left_out == (2,)
+    assert len(found.trials) <= 10
+
+
 @pytest.mark.parametrize(
     ("touch", "force", "status"),
     [

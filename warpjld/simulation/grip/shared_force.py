@@ -38,7 +38,8 @@ transmits a little to both."""
 _POWER = 2.0
 """Assumed exponent of a share's growth since first contact, until two slopes are known (as in ``Bracket``)."""
 _FARTHEST = 4.0
-"""Longest step of a digit, over the first step."""
+"""Longest step of a digit that presses, over the first step; it doubles while a digit keeps on reaching it: what it
+presses on gives way, as a neighbour does."""
 _TOTAL = 30.0
 """Weight of the total force in least squares, beside each digit's share: nearly a constraint."""
 _SINGULAR = 1e4
@@ -143,7 +144,7 @@ class _Search:
     def __init__(self, low: Array, high: Array, strengths: Array, force: float, start: float) -> None:
         self.low, self.high, self.strengths, self.force, self.start = low, high, strengths, force, start
         self.trials: list[tuple[Array, PressedDigits]] = []
-        self._reach = np.full(len(low), start)
+        self._reach, self._most = np.full(len(low), start), np.full(len(low), _FARTHEST * start)
         self._best, self._idle = np.inf, 0
 
     def pressing(self, found: PressedDigits) -> NDArray[np.bool_]:
@@ -236,8 +237,9 @@ class _Search:
             matrix = np.vstack([slopes / share, _TOTAL * (at @ slopes) / self.force])
             wanted = np.append(missing / share, _TOTAL * total / self.force)
             step = np.linalg.lstsq(matrix, wanted, rcond=1.0 / _SINGULAR)[0]
-        most = _FARTHEST * self.start
-        return np.clip(step, -most, most)
+        most = self._most[digits]
+        self._most[digits] = np.where(np.abs(step) > most, 2.0 * most, _FARTHEST * self.start)
+        return np.asarray(np.clip(step, -most, most))
 
     def _way(self, d: int, slope: float, share: float) -> float:
         """Way of one digit to a share if no other moves; its trial before tells how it stiffens."""
