@@ -111,6 +111,22 @@ def test_a_force_beyond_the_muscles_is_unreachable(run: Callable[[str], Scene], 
 
 
 @pytest.mark.slow
+def test_two_fingers_share_a_force_as_their_muscles_do(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    """The middle finger, of which little is asked by its strength, presses little, whoever touched first."""
+    wide = PLATE.replace("BOX 0.036", "BOX 0.09").replace("AT 0.034", "AT 0.02").replace("INDEX", "INDEX MIDDLE")
+    scene = run(wide + "STRENGTH LEFT MIDDLE 20\nSQUEEZE 5 8 LEFT FORCE 2 SHARED BY MUSCLES\nPRESS 2 8 EVERY 3")
+    report = solved(scene, tmp_path)
+    (found,) = report.grips
+    assert found.status == "REACHED", found.text
+    assert found.force == pytest.approx(2.0, rel=0.02)
+    last = {row.digit: row for row in report.rows if row.frame == 8.0 and row.digit in ("index", "middle")}
+    assert last["index"].share == pytest.approx(last["middle"].share, rel=0.1)
+    assert last["index"].bone_n > 2.0 * last["middle"].bone_n  # 59 N and 20 N
+    assert sum(row.bone_n for row in last.values()) == pytest.approx(2.0, rel=0.05)
+    assert len({trial["grip_deg"] for trial in found.rows if trial["chosen"]}) == 2
+
+
+@pytest.mark.slow
 def test_a_force_beyond_the_range_of_motion_is_unreachable(run: Callable[[str], Scene], tmp_path: Path) -> None:
     scene = run(PLATE + "SQUEEZE 5 8 LEFT FORCE 40 MOST 0.5\nPRESS 2 8 EVERY 3")
     (found,) = solved(scene, tmp_path).grips
@@ -234,6 +250,19 @@ def test_grips_that_cannot_be_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         run_contact(run(BALL + lines), tmp_path)
+
+
+def test_forces_that_cannot_be_shared_are_refused(run: Callable[[str], Scene]) -> None:
+    run(BALL)
+    for line, message in (
+        ("SQUEEZE 15 19 LEFT FORCE 4 SHARED", r"<script>:1:34: expected BY here"),
+        ("SQUEEZE 15 19 LEFT FORCE 4 SHARED BY FORCE", r"expected MUSCLES, found FORCE"),
+        ("SQUEEZE 15 19 LEFT FORCE 4 SHARD BY MUSCLES", r"found SHARD; did you mean SHARED\?"),
+        ("SQUEEZE 15 19 LEFT 4 SHARED BY MUSCLES", r"expected the end of the line, found SHARED"),
+        ("SQUEEZE 15 19 LEFT FORCE 4 PINKY SHARED BY MUSCLES", r"pinky does not close here; thumb do"),
+    ):
+        with pytest.raises(InputError, match=message):
+            run(line)
 
 
 @pytest.mark.slow

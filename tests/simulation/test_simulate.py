@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -102,6 +103,25 @@ def test_a_grip_of_recorded_poses_is_refused(rig: Rig) -> None:
     )
     with pytest.raises(InputError, match="LEFT is driven by recorded poses: a grip search needs joint angles"):
         simulate(contact, RecordedAnimation([RecordedActor("LEFT", rig, poses=flat)]))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"force": None}, "a grip needs a force, or lift=True"),
+        ({"share": "force"}, "share: want 'muscles', of the force of a grip that does not lift, got 'force'"),
+        ({"share": "muscles", "lift": True}, "that does not lift, got 'muscles'"),
+        ({"share": "muscles", "digits": ("ring",)}, "digits: ring does not close here; index do"),
+    ],
+)
+def test_grips_that_make_no_sense_are_refused(rig: Rig, change: dict[str, Any], message: str) -> None:
+    grip = GripSpecification("LEFT", "", 1, 2, ("left.index.base.flexion",), most=0.1, force=1.0)
+    contact = ContactSpecification(
+        flesh={"LEFT": FleshMaterial()}, grips=[replace(grip, **change)], pressing=SolveSpecification(0, 2)
+    )
+    flat = np.zeros((3, len(rig.skeleton), 4))
+    with pytest.raises(InputError, match=message):
+        simulate(contact, RecordedAnimation([RecordedActor("LEFT", rig, angles=flat)]))
 
 
 @pytest.mark.slow

@@ -245,7 +245,7 @@ def check_contact(scene: Scene, outputs: Sequence[Output], frames: NDArray[np.fl
 
 def write_contact(found: Simulation, outputs: Sequence[Output], out: OutputFolder) -> None:
     """Write tables, grips, tactile signals and volumes of a simulation into the output folder."""
-    from warpjld.simulation.grip.find import write_grips
+    from warpjld.simulation.grip.found import write_grips
     from warpjld.simulation.report.table import write_table
     from warpjld.simulation.report.volume_series import write_volumes
 

@@ -42,7 +42,7 @@ from warpjld.simulation.display.surfaces import DeformedSurfaces
 from warpjld.simulation.display.visible_pressure import VisiblePressure
 from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
-from warpjld.simulation.grip.find import FoundGrip
+from warpjld.simulation.grip.found import FoundGrip
 from warpjld.simulation.report.parted import parted_notes
 from warpjld.simulation.report.table import ContactRow, ContactTable
 from warpjld.simulation.report.tactile import Tactile, tactile_readings

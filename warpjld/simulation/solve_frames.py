@@ -14,7 +14,8 @@ from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct_frames import correct_frame, uncorrected
-from warpjld.simulation.grip.find import FoundGrip, find_grip
+from warpjld.simulation.grip.find import find_grip
+from warpjld.simulation.grip.found import FoundGrip
 from warpjld.simulation.grip.kept import grip_content, restored_grip
 from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone

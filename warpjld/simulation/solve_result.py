@@ -10,7 +10,7 @@ from warpjld.fem.contact import ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.find import FoundGrip
+from warpjld.simulation.grip.found import FoundGrip
 from warpjld.simulation.solve.bone_clearance import TightBone
 from warpjld.simulation.solve.corrected_digit import CorrectedDigit
 from warpjld.simulation.solve.force_limit import Stop

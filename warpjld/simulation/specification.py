@@ -114,6 +114,8 @@ class GripSpecification:
         weight: Weight of the object [N]; None: from its density.
         force: Target for the sum of the digits' forces [N].
         digits: Digits whose forces count, as ``index``; empty for all that close.
+        share: ``muscles``: with a ``force``, every such digit closes by an angle of its own, so that all use the same
+            share of their muscles, and the others stay; None: all joints close by the same angle.
         where: Script location, for messages.
 
     Examples:
@@ -133,6 +135,7 @@ class GripSpecification:
     weight: float | None = None
     force: float | None = None
     digits: tuple[str, ...] = ()
+    share: Literal["muscles"] | None = None
     where: SourceLocation | None = None
 
     @property

@@ -14,6 +14,7 @@ from warpjld.study.grasping import GraspExperiment, load_plan
 from warpjld.study.grasping.grip_plots import GRIP_SHARES, finger_shares, write_grip_plots
 from warpjld.study.grasping.load import hand_of
 from warpjld.study.grasping.plan import GraspPlan
+from warpjld.study.pool import perform
 from warpjld.tables.files import read_table
 
 _EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "grip_pressure.toml"
@@ -85,6 +86,7 @@ def test_without_contact_a_study_is_what_it_was(tmp_path: Path) -> None:
         ("weights = [5, 10]\n", "", r"contact.weights: is missing"),
         ("[5, 10]", "[5, 0]", r"contact.weights: want .* above 0"),
         ("element = 0.008", "element = 0.8", r"contact.element: want .* up to 0.02"),
+        ("element = 0.008", 'element = 0.008\nshare = "force"', r"contact.share: want one of angles, muscles"),
         ("element", "elements", r"contact.elements: unknown key; did you mean element\?"),
         ("best_of = 32", "palm = true", r"wrist.palm: is for best_of"),
     ],
@@ -111,6 +113,21 @@ def test_plots_of_grips(tmp_path: Path) -> None:
     assert [path.name for path in drawn] == ["grips.png", "pressure.png"]
     assert all(path.stat().st_size > 10_000 for path in drawn)
     assert write_grip_plots(tmp_path, plan, [row | {"press": "LIMIT"}], arrays) == []
+
+
+@pytest.mark.slow
+def test_digits_on_a_handle_use_the_same_share_of_their_muscles(tmp_path: Path) -> None:
+    _plan(tmp_path, "element = 0.008", 'element = 0.006\nshare = "muscles"')
+    experiment = GraspExperiment(load_plan(tmp_path / "plan.toml"))
+    row, _ = perform(experiment, 0)
+    assert (row["press"], row["success"]) == ("REACHED", True), row["message"]
+    assert row["force"] == pytest.approx(12.5, rel=0.05)
+    forces = np.array([row[f"force_{digit}"] for digit in ("thumb", "index", "middle", "ring", "pinky")])
+    shares = np.array([row[f"share_{digit}"] for digit in ("thumb", "index", "middle", "ring", "pinky")])
+    pressing = shares > 0.1 * shares.max()  # others do not reach the handle
+    assert pressing.sum() >= 4
+    np.testing.assert_allclose(shares[pressing], shares[pressing].mean(), rtol=0.1)
+    assert forces.max() < 0.5 * forces.sum()
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
@@ -26,13 +26,13 @@ _MOST = 20.0
     "SQUEEZE",
     syntax=(
         "SQUEEZE <key1> <key2> [LEFT/RIGHT] <degrees>, or SQUEEZE <key1> <key2> [LEFT/RIGHT] FORCE <newtons> "
-        "[THUMB/INDEX/MIDDLE/RING/PINKY …] [MOST <degrees>]"
+        "[THUMB/INDEX/MIDDLE/RING/PINKY …] [SHARED BY MUSCLES] [MOST <degrees>]"
     ),
-    help="Flex closed digits further: each joint by up to this angle, or until they press with a FORCE.",
+    help="Flex closed digits further: by an angle, or until they press with a FORCE, each alike or as its MUSCLES can.",
     group="Contact",
 )
 def squeeze(scene: Scene, arguments: Arguments) -> None:
-    """Flex closed digits further into the object, by up to an angle or until they press with a force (R112)."""
+    """Flex closed digits further into the object, by up to an angle or until they press with a force (R112, R118)."""
     first, last = read_frames(arguments, "from which on the digits press", "at which they press most")
     actor = gripping_actor(scene, arguments)
     if not arguments.keyword("FORCE"):
@@ -45,14 +45,21 @@ def squeeze(scene: Scene, arguments: Arguments) -> None:
     digits = []
     while digit := arguments.keyword(*DIGIT_WORDS):
         digits.append(digit.lower())
-    most = _most(arguments)
+    share: Literal["muscles"] | None = None
+    if arguments.keyword("SHARED"):
+        arguments.choice("", ("BY",))
+        arguments.choice("", ("MUSCLES",))
+        share = "muscles"
+    most = _most(arguments, *(() if share else ("SHARED",)))
     channels = _held_keys(scene, actor, arguments, first, last)
     closing = {channel.split(".")[-3] for channel in channels}
     for digit in digits:
         if digit not in closing:
             raise arguments.error(f"{digit} does not close here; {', '.join(sorted(closing))} do", arguments.position)
     here = place(arguments)
-    wish = GripSpecification(actor.name, "", first, last, channels, most, force=force, digits=tuple(digits), where=here)
+    wish = GripSpecification(
+        actor.name, "", first, last, channels, most, force=force, digits=tuple(digits), share=share, where=here
+    )
     scene.contact.grips.append(wish)
 
 
@@ -100,9 +107,9 @@ def strength(scene: Scene, arguments: Arguments) -> None:
     scene.contact.strength.setdefault(actor.name, {})[digit] = newtons
 
 
-def _most(arguments: Arguments) -> float:
+def _most(arguments: Arguments, *beside: str) -> float:
     """Read the option MOST: the largest angle by which digits close further [rad]."""
-    options = arguments.options(most=lambda: arguments.number("the angle in degrees", above=0.0, maximum=90.0))
+    options = arguments.options(*beside, most=lambda: arguments.number("the angle in degrees", above=0.0, maximum=90.0))
     return math.radians(float(cast(float, options.get("most", _MOST))))
 
 

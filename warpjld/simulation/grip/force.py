@@ -23,6 +23,7 @@ class ForceStatus(Enum):
     """How a search for a force ended; the value is the message."""
 
     REACHED = "the digits press as asked"
+    UNEVEN = "the digits press with that force, but not each with the same share of its muscles"
     HARDER_ALREADY = "the digits press harder than that before they close on"
     TOO_WEAK = "unreachable: more force would be needed than the muscles have"
     LIMIT = "unreachable: the digits are bent as far as they may"

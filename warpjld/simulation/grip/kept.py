@@ -8,7 +8,7 @@ from typing import Any
 
 from warpjld.errors import InputError
 from warpjld.simulation.animation import AngleEdit
-from warpjld.simulation.grip.find import FoundGrip, SupportRelease
+from warpjld.simulation.grip.found import FoundGrip, SupportRelease
 from warpjld.simulation.specification import ContactSpecification
 
 __all__ = ["grip_content", "restored_grip"]

@@ -69,6 +69,7 @@ def _check_grip(contact: ContactSpecification, grip: GripSpecification, request:
         raise InputError(f"its frames must lie in those of PRESS, {span}, got {grip.first:g} to {grip.last:g}")
     if request.method == "paper":
         raise InputError("a grip cannot be searched for by the paper's method, which knows no friction")
+    _check_share(grip)
     if not grip.lift:
         return
     if np.count_nonzero(contact.pull) != 1:
@@ -82,6 +83,18 @@ def _check_grip(contact: ContactSpecification, grip: GripSpecification, request:
         raise InputError("LIFT wants an object that nothing but HOLD keeps in its place: no VECTOR and no PARTIAL")
     if grip.weight is None and not contact.physical[grip.object].density > 0.0:
         raise InputError(f"{grip.object} weighs nothing: give it a DENSITY, or LIFT it with a WEIGHT")
+
+
+def _check_share(grip: GripSpecification) -> None:
+    if not grip.lift and grip.force is None:
+        raise InputError("a grip needs a force, or lift=True")
+    if grip.share is None:
+        return
+    if grip.share != "muscles" or grip.lift:
+        raise InputError(f"share: want 'muscles', of the force of a grip that does not lift, got {grip.share!r}")
+    closing = {channel.split(".")[-3] for channel in grip.channels}
+    if stray := [digit for digit in grip.digits if digit not in closing]:
+        raise InputError(f"digits: {stray[0]} does not close here; {', '.join(sorted(closing)) or 'none'} do")
 
 
 def check_model(model: ContactModel, contact: ContactSpecification) -> None:

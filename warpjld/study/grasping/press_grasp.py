@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ def press_grasp(
     weight: float,
     how: ContactPlan,
 ) -> tuple[dict[str, Any], Array | None, str]:
-    """Flex all digits by the same angle, as ``SQUEEZE … FORCE`` does, until their force is the one that holds a weight.
+    """Flex the digits, as ``SQUEEZE … FORCE`` does, until their force is the one that holds a weight.
 
     Args:
         hand: Hand, whose flesh is meshed.
@@ -96,7 +96,8 @@ def press_grasp(
 def _specification(hand: Hand, asked: float, friction: float, how: ContactPlan) -> ContactSpecification:
     channels = tuple(f"{hand.side}.{digit}.{knuckle}.flexion" for digit in DIGITS for knuckle in _KNUCKLES)
     most = float(np.radians(how.most))
-    grip = GripSpecification(_HAND, _OBJECT, _CLOSED, _CLOSED + 1, channels, most=most, force=asked)
+    share: Literal["muscles"] | None = "muscles" if how.share == "muscles" else None
+    grip = GripSpecification(_HAND, _OBJECT, _CLOSED, _CLOSED + 1, channels, most=most, force=asked, share=share)
     return ContactSpecification(
         flesh={_HAND: FleshMaterial(element=how.element, itself=False)},
         friction={name_pair(_HAND, _OBJECT): friction},

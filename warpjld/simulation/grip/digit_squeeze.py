@@ -1,0 +1,161 @@
+"""Equilibria of a hand whose digits each close further by an angle of its own from a solved frame (R118, R123)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
+from warpjld.fem.hand.blend import Moves
+from warpjld.fem.hand.muscles import Effort
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.flesh_body import FleshBody
+from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.shared_force import PressedDigits
+from warpjld.simulation.grip.squeeze import TRAVEL
+from warpjld.simulation.report.efforts import effort_at
+from warpjld.simulation.sensitivity.effort_slope import EffortTangent
+from warpjld.simulation.sensitivity.parameters import angles_perturbed
+from warpjld.simulation.solve.branch import solve_branch
+from warpjld.skeleton import Poses
+from warpjld.skeleton.channels import FLEXION
+
+__all__ = ["DigitSqueeze"]
+
+_SAME = 1e-9
+"""Tolerance for equal closings [rad]."""
+
+Array = NDArray[np.float64]
+
+
+class DigitSqueeze:
+    """Equilibria by the digits' closings: angles [rad] by which the joints of each flex beyond their present flexion,
+    or extend if negative, each up to its limit.
+
+    Args:
+        model: The contact model.
+        history: History at the initial equilibrium.
+        hand: The hand that closes; it has to be driven by joint angles.
+        joints: Digit, as in its efforts → indices of the joints that flex.
+        after: Initial equilibrium.
+        limits: Digit → force limit that differs from the default [N].
+
+    Attributes:
+        digits: Names of the digits that close, in the order of all arrays.
+        solved: Equilibria solved so far, beside the initial one.
+    """
+
+    def __init__(
+        self,
+        model: ContactModel,
+        history: History,
+        hand: FleshBody,
+        joints: Mapping[str, Sequence[int]],
+        after: ContactSolution,
+        limits: Mapping[str, float] | None = None,
+    ) -> None:
+        self._model, self._history, self._hand, self._limits = model, history, hand, limits
+        self.digits, self._joints = tuple(joints), [list(one) for one in joints.values()]
+        self._start, self._time = hand.bones.angles(after.last.time), after.last.time
+        self._bounds = hand.bones.skeleton.limits[:, FLEXION]
+        self._known: list[tuple[Array, ContactSolution]] = [(np.zeros(len(self.digits)), after)]
+        self.solved = 0
+
+    @property
+    def range(self) -> tuple[Array, Array]:
+        """Closings at which the last joint of each digit reaches its limit [rad], each of shape (D,)."""
+        now = self._start[:, FLEXION]
+        low = [float((self._bounds[one, 0] - now[one]).min()) for one in self._joints]
+        high = [float((self._bounds[one, 1] - now[one]).max()) for one in self._joints]
+        return np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+    def angles(self, grips: Array) -> Array:
+        """Joint angles at closings (D,) [rad], shape (J, 4)."""
+        out = self._start.copy()
+        for joints, grip in zip(self._joints, grips, strict=True):
+            now = out[joints, FLEXION]
+            low, high = np.minimum(self._bounds[joints, 0], now), np.maximum(self._bounds[joints, 1], now)
+            out[joints, FLEXION] = np.clip(now + grip, low, high)
+        return out
+
+    def press(self, grips: Array) -> PressedDigits | None:
+        """Forces at closings (D,); None if contact could not be solved."""
+        closed = self._closed(grips)
+        if closed is None:
+            return None
+        effort = self.effort(grips, closed.last)
+        mine = [effort[digit] for digit in self.digits]
+        forces, shares = (np.array([getattr(one, name) for one in mine]) for name in ("force", "share"))
+        return PressedDigits(forces, shares, self._slopes(grips, closed, effort) if closed.last.touches else None)
+
+    def effort(self, grips: Array, instant: ContactInstant) -> Effort:
+        """Effort of the muscles at closings (D,)."""
+        return effort_at(self._model, self._hand, self._posed(self.angles(grips)), instant, self._limits)
+
+    def known(self, grips: Array) -> ContactInstant | None:
+        """The equilibrium at closings that were tried; None if it was not found."""
+        found = [closed for at, closed in self._known if np.abs(at - grips).max() < _SAME]
+        return found[0].last if found else None
+
+    def _closed(self, grips: Array) -> ContactSolution | None:
+        """Equilibrium at closings, reached from the nearest known one at which no digit is bent further.
+
+        Friction remembers its way, and the keys that are found close the digits without opening them again.
+        """
+        same = [closed for at, closed in self._known if np.abs(at - grips).max() < _SAME]
+        if same:
+            return same[0]
+        below = [one for one in self._known if (one[0] <= np.maximum(grips, 0.0) + _SAME).all()]
+        at, before = max(below, key=lambda one: float(one[0].sum()))
+
+        def moves(share: float) -> Moves:
+            return self._hand.bones.moves_of(self.angles(at + share * (grips - at)), self._time)
+
+        steps = self._hand.bones.steps([(self.angles(end), self._time) for end in (at, grips)], TRAVEL)
+        found = solve_branch(self._model, self._history, before, steps, moves=(self._hand.name, moves))
+        self.solved += 1
+        if not found.converged:
+            return None
+        self._known.append((grips.copy(), found))
+        return found
+
+    def _slopes(self, grips: Array, closed: ContactSolution, effort: Effort) -> Array | None:
+        """Derivatives of the shares by the closings [1/rad], shape (D, D); None if the equilibrium has none."""
+        model, hand, time, angles = self._model, self._hand, self._time, self.angles(grips)
+        largest = [int(effort[digit].shares.argmax()) for digit in self.digits]
+        out = np.zeros((len(self.digits), len(self.digits)))
+        try:
+            known = model.prescribed(time, self._history).degrees
+            tangent = EquilibriumTangent(model.body, model.pairs, closed, known, steadied=True)
+            contact = tangent.contact.sum(axis=0)
+            efforts = EffortTangent(model, hand, closed.last, contact, self._posed(angles), self._limits)
+            for j, along in enumerate(self._along(grips)):
+                change = angles_perturbed(model, hand, angles, time, along)
+                response = tangent.response(change)
+
+                def pose(by: float, along: Array = along) -> Poses:
+                    return self._posed(angles + by * along)
+
+                found = efforts.slopes(response, change, pose)
+                out[:, j] = [
+                    found[effort[digit].digit].shares[k] for digit, k in zip(self.digits, largest, strict=True)
+                ]
+        except SensitivityError:
+            return None
+        return out
+
+    def _along(self, grips: Array) -> list[Array]:
+        """Derivatives of the angles by each closing, each of shape (J, 4); 0 for joints at their limits."""
+        angles, out = self.angles(grips), []
+        for joints in self._joints:
+            along = np.zeros_like(angles)
+            now = angles[joints, FLEXION]
+            along[joints, FLEXION] = (now < self._bounds[joints, 1] - _SAME) & (now > self._bounds[joints, 0] + _SAME)
+            out.append(along)
+        return out
+
+    def _posed(self, angles: Array) -> Poses:
+        return self._hand.bones.posed(angles, self._time)
