@@ -102,6 +102,7 @@ def test_other_parameters_keep_what_follows_what(dressed: tuple[Covering, np.nda
     np.testing.assert_allclose(again.deform(poses), fresh.deform(poses), atol=1e-8)
 
 
+@pytest.mark.slow
 def test_eyes_of_a_body_go_with_the_head() -> None:
     """Where nobody tells that they are rigid."""
     path = SHARED / "data" / "body_anny" / "body_104joints.glb"
