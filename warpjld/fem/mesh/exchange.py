@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import io
 from contextlib import redirect_stderr, redirect_stdout
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.fem.mesh.hexmesh import HexMesh
-from warpjld.files.ansys import refuse_ansys
+from warpjld.io.meshio_process import with_meshio
 
-__all__ = ["read_volume_mesh"]
+__all__ = ["leave_volume_mesh", "read_volume_mesh"]
+
+_FILE = "mesh.npz"
 
 _CORNERS = {  # nodes of a (degenerate) hexahedron, as indices into the cell's nodes
     "hexahedron": [0, 1, 2, 3, 4, 5, 6, 7],
@@ -34,13 +37,25 @@ def read_volume_mesh(path: Path, *, scale: float = 1.0) -> HexMesh:
         InputError: Unreadable, or without volume elements.
         MissingExtraError: meshio is not installed.
     """
-    try:
-        import meshio
-    except ImportError as error:
-        raise MissingExtraError("reading volume meshes", "mesh") from error
+    if find_spec("meshio") is None:
+        raise MissingExtraError("reading volume meshes", "mesh")
     if not path.is_file():
         raise InputError("no such file", path=path)
-    refuse_ansys(path)
+    here = ("warpjld.fem.mesh.exchange", "leave_volume_mesh")
+    with with_meshio(here, path, "a volume mesh", scale) as answer, np.load(answer.folder / _FILE) as file:
+        return HexMesh(file["nodes"], file["elements"], file["regions"], tuple(answer.value))
+
+
+def leave_volume_mesh(folder: Path, path: Path, scale: float) -> list[str]:
+    """In the process: write the arrays of a mesh to the folder, and return the names of its regions."""
+    mesh = _read(path, scale)
+    np.savez(folder / _FILE, nodes=mesh.nodes, elements=mesh.elements, regions=mesh.regions)
+    return list(mesh.region_names)
+
+
+def _read(path: Path, scale: float) -> HexMesh:
+    import meshio
+
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):  # meshio prints what is wrong, and exits
