@@ -138,7 +138,7 @@ def _loaded(path: Path) -> object:
 PACKED: dict[str, tuple[Callable[[Path], None], Callable[[Path], object]]] = {
     "a.usdz": (_usdz, _usd),
     "study.zip": (_folder, _resumed),
-    **{f"object.{kind}": (_volume, _loaded) for kind in ("vtk", "vtu", "mesh", "msh", "inp", "nas")},
+    **{f"object.{kind}": (_volume, _loaded) for kind in ("vtk", "vtu", "mesh", "inp", "nas")},
 }
 """How a sound file of each kind is written, and what reads it."""
 if find_spec("lxml") is not None and find_spec("networkx") is not None:
