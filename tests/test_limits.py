@@ -161,7 +161,17 @@ def test_recordings_as_json_are_limited_by_memory(tmp_path: Path, monkeypatch: p
         read_hands(tmp_path / "hand.json")
 
 
-def test_a_mesh_whose_reader_never_ends(tmp_path: Path) -> None:
-    (tmp_path / "a.msh").write_bytes(b'(1 "meshio 5.3.5")\n(2 3)\n(3010 (1 1 8 1 3)(\n')
-    with pytest.raises(InputError, match=r"a\.msh: is an ANSYS mesh"):
-        read_mesh(tmp_path / "a.msh")
+@pytest.mark.parametrize(
+    ("name", "content"),
+    {
+        "a.msh": '(1 "meshio 5.3.5")\n(2 3)\n(3010 (1 1 8 1 3)(\n',  # ANSYS
+        "a.nas": "GRID*   1\nBEGIN BULK\n$ Nastran file",
+    }.items(),
+)
+def test_a_mesh_whose_reader_never_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, content: str
+) -> None:
+    monkeypatch.setenv("WARPJLD_LIMIT_MESH_SECONDS", "1")
+    (tmp_path / name).write_text(content)
+    with pytest.raises(InputError, match=rf"{name}: cannot be read as .*: not done after 1 s .*mesh-seconds="):
+        read_mesh(tmp_path / name)

@@ -48,8 +48,9 @@ LIMITS = {
     "text": Limit(10_000, "characters", "a text in a script with its macro parameters put in"),
     "trials": Limit(1_000_000, "trials", "a study"),
     "instants": Limit(100_000, "instants", "a load step"),
-    "reader-bytes": Limit(2 << 30, "bytes", "memory of the process that reads USD or FBX, besides some a byte of it"),
+    "reader-bytes": Limit(2 << 30, "bytes", "memory of the process that reads USD, FBX or, by meshio, a mesh"),
     "reader-seconds": Limit(600, "seconds", "the process that reads USD or FBX"),
+    "mesh-seconds": Limit(15, "seconds", "the process that reads a mesh by meshio, besides one a megabyte of it"),
     "elements": Limit(2_000_000, "elements", "a finite-element mesh"),
 }
 """Limits by their names in ``--limit``; environment variables have them in capitals with underscores."""

@@ -171,14 +171,13 @@ def test_embedded_points_follow_a_linear_field_exactly() -> None:
         embed(mesh, np.array([[5.0, 0.0, 0.0]]))
 
 
-@pytest.mark.parametrize("suffix", [".vtu", ".inp", ".msh"])
-def test_exchange(tmp_path: Path, suffix: str) -> None:
+@pytest.mark.parametrize(("suffix", "form"), [(".vtu", "vtu"), (".inp", "abaqus"), (".msh", "gmsh"), (".msh", "ansys")])
+def test_exchange(tmp_path: Path, suffix: str, form: str) -> None:
     meshio = pytest.importorskip("meshio")
     from warpjld.fem.mesh.exchange import read_volume_mesh
 
     mesh = ball_hexes(1.0, n=2)
-    how = {"file_format": "gmsh"} if suffix == ".msh" else {}  # ANSYS's by default, which are refused
-    meshio.write(tmp_path / f"ball{suffix}", meshio.Mesh(mesh.nodes, [("hexahedron", mesh.elements)]), **how)
+    meshio.write(tmp_path / f"ball{suffix}", meshio.Mesh(mesh.nodes, [("hexahedron", mesh.elements)]), form)
     again = read_volume_mesh(tmp_path / f"ball{suffix}")
     np.testing.assert_allclose(again.nodes[again.elements], mesh.nodes[mesh.elements], atol=1e-12)
 

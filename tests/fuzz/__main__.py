@@ -86,7 +86,7 @@ def main() -> int:
     parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), help="only these")
     parser.add_argument("--turn", type=float, default=_TURN, help="seconds of a kind before the next has its turn")
     given = parser.parse_args()
-    os.environ |= {"OMP_NUM_THREADS": "1", "WARPJLD_CACHE": "off"}
+    os.environ |= {"OMP_NUM_THREADS": "1", "WARPJLD_CACHE": "off", "WARPJLD_LIMIT_MESH_SECONDS": "4"}
     folder = Path(tempfile.mkdtemp(prefix="warpjld-fuzz-"))
     tally = fuzz(60.0 * given.minutes, given.seed, given.kinds, folder, turn=given.turn)
     for kind, told, path in tally.found:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from warpjld.io.gltf.skin import read_gltf_rig
 from warpjld.io.source import SourceRig
 from warpjld.motion.fbx_animation import fbx_animation_names, read_fbx_animation
 from warpjld.motion.load import load_motion
+from warpjld.runtime.separate_process import end_process
 
 pytest.importorskip("ufbx")
 
@@ -389,10 +389,17 @@ def test_a_file_without_animation_says_so(tmp_path: Path) -> None:
         read_fbx_animation(chain().write(tmp_path / "still.fbx"))
 
 
+def _ufbx_that(does: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module in ufbx's place."""
+    (folder / "instead" / "ufbx").mkdir(parents=True)
+    (folder / "instead" / "ufbx" / "__init__.py").write_text(does)
+    monkeypatch.syspath_prepend(folder / "instead")
+    end_process()  # the next one has this path
+
+
 def test_a_reader_that_crashes_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = chain().write(tmp_path / "rig.fbx")
-    crashed = subprocess.CompletedProcess([], -11, "", "")
-    monkeypatch.setattr(subprocess, "run", lambda *a, **k: crashed)
+    _ufbx_that("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", tmp_path, monkeypatch)
     with pytest.raises(InputError, match="ends with code -11"):
         read_fbx_rig(path)
 
@@ -406,10 +413,7 @@ def test_without_ufbx_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_without_ufbx_that_can_be_imported_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = chain().write(tmp_path / "rig.fbx")
-    blocked = tmp_path / "blocked" / "ufbx"
-    blocked.mkdir(parents=True)
-    (blocked / "__init__.py").write_text("raise ImportError('built for another Python')")
-    monkeypatch.setenv("PYTHONPATH", str(blocked.parent))
+    _ufbx_that("raise ImportError('built for another Python')", tmp_path, monkeypatch)
     with pytest.raises(MissingExtraError, match=r"warpjld\[fbx\]"):
         load_rig(path)
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.files.ansys import refuse_ansys
-from warpjld.files.archive import check_archive
 from warpjld.files.input_file import check_input
 from warpjld.files.reading import reading
 from warpjld.geometry.surface import Part, one_uv_a_vertex
+from warpjld.io.by_trimesh import BY_TRIMESH, load_trimesh_surface
 from warpjld.io.obj_file import read_obj
 from warpjld.io.obj_material import obj_textures
 from warpjld.io.off_file import read_off
@@ -63,8 +60,8 @@ def read_mesh(path: str | Path) -> MeshFile:
     """
     path = Path(path)
     kind = path.suffix.lower()
-    if kind not in (*_READERS, *_BY_TRIMESH):
-        known = ", ".join((*_READERS, *_BY_TRIMESH))
+    if kind not in (*_READERS, *BY_TRIMESH):
+        known = ", ".join((*_READERS, *BY_TRIMESH))
         raise InputError(f"'{path.suffix}' is not a kind of surface file that can be read; known: {known}", path=path)
     check_input(path)
     with reading(path, kind.lstrip(".").upper()):
@@ -105,45 +102,8 @@ def _gltf(path: Path) -> MeshFile:
 
 
 def _by_trimesh(path: Path) -> MeshFile:
-    import trimesh
-
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in trimesh.available_formats():
-        raise InputError(f"{kind.upper()} files need packages that trimesh reads them with: save as STL, OBJ or PLY")
-    refuse_ansys(path)
-    if kind == "3mf":
-        check_archive(path)
-    # not load_scene, which trimesh 4.5 does not have yet
-    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):  # its readers print
-        loaded = trimesh.load(path, process=False, force="scene")
-    scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene(loaded)
-    vertices, faces, uvs, parts = [], [], [], []
-    points = triangles = 0
-    for node in scene.graph.nodes_geometry:
-        transform, key = scene.graph[node]
-        mesh = scene.geometry[key]
-        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-            continue
-        check_limit("vertices", points + len(mesh.vertices), path=path)
-        vertices.append(mesh.vertices @ transform[:3, :3].T + transform[:3, 3])
-        turned = np.linalg.det(transform[:3, :3]) < 0  # a mirroring node inverts its triangles
-        faces.append((mesh.faces[:, ::-1] if turned else mesh.faces) + points)
-        uvs.append(getattr(mesh.visual, "uv", None))
-        ends = points + len(mesh.vertices), triangles + len(mesh.faces)
-        parts.append(Part(str(key), slice(points, ends[0]), slice(triangles, ends[1])))
-        points, triangles = ends
-    if not parts:
-        raise InputError("has no triangles", path=path)
-    everything = np.concatenate(vertices).astype(np.float64)
-    return MeshFile(path, everything, np.concatenate(faces).astype(np.int64), _uv(uvs, parts), None, tuple(parts))
-
-
-def _uv(uvs: list[NDArray[np.float64] | None], parts: list[Part]) -> NDArray[np.float32] | None:
-    if all(uv is None for uv in uvs):
-        return None
-    sizes = [part.vertices.stop - part.vertices.start for part in parts]
-    filled = [np.zeros((n, 2)) if uv is None or len(uv) != n else uv for uv, n in zip(uvs, sizes, strict=True)]
-    return np.concatenate(filled).astype(np.float32)
+    found = load_trimesh_surface(path)
+    return MeshFile(path, found.vertices, found.faces, found.uv, None, found.parts)
 
 
 def _of_polygons(path: Path, file: PlyFile) -> MeshFile:
@@ -173,8 +133,6 @@ _READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".gltf": _gltf,
     ".vrm": _gltf,
 }
-_BY_TRIMESH = (".stl", ".stl_ascii", ".3mf", ".dae", ".vtk", ".vtu", ".msh", ".mesh", ".inp", ".nas", ".bdf")
-"""trimesh's surface formats; its readers of archives and drawings are excluded, as these open any file named inside."""
 
 
 def _check_finite(vertices: NDArray[np.float64], path: Path) -> None:

@@ -20,9 +20,9 @@ from typing import Any
 
 from warpjld.errors import InputError
 from warpjld.limits import limit, variable
-from warpjld.runtime.separate_process import LATE, running_process
+from warpjld.runtime.separate_process import LATE, end_process, running_process
 
-__all__ = ["Answer", "separately", "too_late", "too_much"]
+__all__ = ["Answer", "separately"]
 
 _TRIES = 2  # a process may end, being idle, just when it is asked
 _lock = threading.RLock()
@@ -42,7 +42,16 @@ class Answer:
 
 
 @contextmanager
-def separately(place: tuple[str, str], path: Path, kind: str, *arguments: object, per_byte: int) -> Iterator[Answer]:
+def separately(
+    place: tuple[str, str],
+    path: Path,
+    kind: str,
+    *arguments: object,
+    per_byte: int,
+    within: str = "reader-seconds",
+    seconds_per_byte: float = 0.0,
+    once: bool = False,
+) -> Iterator[Answer]:
     """Result of ``function(folder, path, *arguments)``, called in a process of its own.
 
     Args:
@@ -52,11 +61,15 @@ def separately(place: tuple[str, str], path: Path, kind: str, *arguments: object
         kind: Expected kind of file, for messages.
         arguments: Further arguments, as JSON has them.
         per_byte: Memory that it may use for each byte of the file, besides the limit ``reader-bytes``.
+        within: Name of the limit on the time that it may take.
+        seconds_per_byte: Time that it may take for each byte of the file, besides that limit [s].
+        once: Whether the process ends after the call, since the library leaves memory that is never freed.
 
     Raises:
         InputError: As the function does; or the process crashed, needed too much memory, or did not end in time.
     """
     memory = limit("reader-bytes") + per_byte * _size(path)
+    seconds = limit(within) + seconds_per_byte * _size(path)
     request = {
         "place": place,
         "path": str(path.absolute()),
@@ -66,11 +79,15 @@ def separately(place: tuple[str, str], path: Path, kind: str, *arguments: object
         "limits": {name: value for name, value in os.environ.items() if name.startswith(variable(""))},
     }
     with _lock:
-        yield _answer(json.dumps(request), path, kind, memory)
+        try:
+            yield _answer(json.dumps(request), path, kind, memory, (within, seconds))
+        finally:
+            if once:
+                end_process()
 
 
-def _answer(request: str, path: Path, kind: str, memory: int) -> Answer:
-    seconds, code = limit("reader-seconds"), 0
+def _answer(request: str, path: Path, kind: str, memory: int, time: tuple[str, float]) -> Answer:
+    (within, seconds), code = time, 0
     for _ in range(_TRIES):
         try:
             process = running_process()
@@ -81,28 +98,23 @@ def _answer(request: str, path: Path, kind: str, memory: int) -> Answer:
         if line.endswith("\n"):
             told = json.loads(line)
             if "memory" in told:
-                raise too_much(kind, memory, path)
+                raise _too_much(kind, memory, path)
             if "refused" in told:
                 raise _refusal(told["refused"], path)
             return Answer(told["value"], process.folder)
         code = process.end()
         if line == LATE:
-            raise too_late(kind, seconds, path)
+            raise InputError(
+                f"cannot be read as {kind}: not done after {seconds:.0f} s (raise it by warpjld --limit {within}=… or "
+                f"{variable(within)})",
+                path=path,
+            )
         if code:
             break
-    raise too_much(kind, memory, path, f"the process that reads it ends with code {code}: the file is damaged, or ")
+    raise _too_much(kind, memory, path, f"the process that reads it ends with code {code}: the file is damaged, or ")
 
 
-def too_late(kind: str, seconds: int, path: Path) -> InputError:
-    """Error of a file that is not read in time [s]."""
-    return InputError(
-        f"cannot be read as {kind}: not done after {seconds} s (raise it by warpjld --limit reader-seconds=… or "
-        f"{variable('reader-seconds')})",
-        path=path,
-    )
-
-
-def too_much(kind: str, memory: int, path: Path, why: str = "") -> InputError:
+def _too_much(kind: str, memory: int, path: Path, why: str = "") -> InputError:
     """Error of a file whose reading needs more memory than it may [bytes]."""
     return InputError(
         f"cannot be read as {kind}: {why}it needs more than {memory:,} bytes of memory (raise it by warpjld --limit "

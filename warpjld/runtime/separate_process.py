@@ -13,7 +13,7 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
-__all__ = ["LATE", "running_process"]
+__all__ = ["LATE", "end_process", "running_process"]
 
 LATE = "late"
 """What is answered where nothing was in time."""
@@ -105,6 +105,7 @@ def running_process() -> _Process:
 
 
 @atexit.register
-def _end() -> None:
+def end_process() -> None:
+    """End the process that is kept, if there is one."""
     if _process is not None:
         _process.end()

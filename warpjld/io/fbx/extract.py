@@ -1,26 +1,26 @@
-"""Program that converts an FBX file's content to an NPZ file: ``extract.py FILE OUT.npz ANIMATED NAME RATE MEMORY``.
+"""Content of an FBX file in its own units and axes, for a process of its own: see :mod:`warpjld.runtime.separate`.
 
-It runs in a process of its own, imports nothing of this package, and exits without cleaning up, because ufbx's Python
-binding (0.0.5) has a reference counting error: it keeps each element of a scene in a table and returns the table's own
-reference, so that garbage collection frees elements twice. Here each element gets an additional reference, nothing is
-ever freed, and a crash on a broken file ends this process only. Its memory is limited to MEMORY bytes of addresses.
-
-Everything is in the file's own units and axes. Exit code 3 with one line on stderr means that the file cannot be
-used, 4 that ufbx cannot be imported, 5 that memory does not suffice.
+ufbx's Python binding (0.0.5) has a reference counting error: it keeps each element of a scene in a table and returns
+the table's own reference, so that garbage collection frees elements twice. Here each element gets an additional
+reference, nothing is ever freed, and the process ends after the call without cleaning up.
 """
 
 from __future__ import annotations
 
 import ctypes
 import gc
-import json
-import os
-import sys
-from typing import Any, NoReturn
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.errors import InputError
+
+__all__ = ["FBX_ARRAYS", "FBX_FRAMES", "leave_fbx"]
+
+FBX_ARRAYS, FBX_FRAMES = "content.npz", "worlds"
+"""Files that are left: arrays by name, and the transforms of an animation, (F, N, 4, 4) float64."""
 Array = NDArray[Any]
 KEPT: list[Any] = []
 TRANSFORM = ("Lcl Translation", "Lcl Rotation", "Lcl Scaling")
@@ -48,28 +48,22 @@ def matrix(columns: Any) -> Array:
     return out
 
 
-def fail(message: object) -> NoReturn:
-    print(" ".join(str(message).split()), file=sys.stderr, flush=True)
-    os._exit(3)
-
-
-def load(path: str) -> Any:
+def load(path: Path) -> Any:
+    """The scene of a file; None if ufbx is there, but cannot be imported."""
     try:
         import ufbx
     except ImportError:
-        os._exit(4)
+        return None
     try:
         return ufbx.load_file(
-            path,
+            str(path),
             file_format=ufbx.FileFormat.FBX,
             ignore_embedded=True,
             # invalid indices are reported by their user, not moved to another vertex silently
             index_error_handling=ufbx.IndexErrorHandling.NO_INDEX,
         )
     except (ufbx.UfbxError, RuntimeError, ValueError) as error:
-        fail(error)
-    except MemoryError:
-        os._exit(5)
+        raise InputError(f"cannot be read as FBX: {' '.join(str(error).split())}", path=path) from None
 
 
 def bind_poses(scene: Any) -> dict[int, Array]:
@@ -200,11 +194,11 @@ def varies(curve: Any) -> bool:
     return len({keys[i].value for i in range(len(keys))}) > 1
 
 
-def sample(scene: Any, stack: int, times: Array, out: str) -> None:
+def sample(scene: Any, stack: int, times: Array, out: Path) -> None:
     """Write node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4), as raw float64."""
     anim = taken(taken(scene.anim_stacks[stack]).anim)
     world = np.tile(np.eye(4), (len(scene.nodes), 1, 1))
-    with open(out, "wb") as file:
+    with out.open("wb") as file:
         for time in times:
             shown = scene.evaluate(anim, float(time))
             KEPT.append(shown)
@@ -215,10 +209,23 @@ def sample(scene: Any, stack: int, times: Array, out: str) -> None:
             file.write(world.tobytes())
 
 
-def main(path: str, out: str, animated: str, name: str, rate: str, memory: str) -> None:
+def leave_fbx(folder: Path, path: Path, animated: bool, name: str, rate: float) -> dict[str, Any]:
+    """Write the arrays of a file to the folder, and return the rest.
+
+    Args:
+        folder: The folder.
+        path: The file.
+        animated: Whether to read an animation.
+        name: Its name; empty for the first that moves anything.
+        rate: Frames a second; 0 for the file's own.
+
+    Raises:
+        InputError: ufbx cannot read the file, or the animation is too long.
+    """
     gc.disable()  # it would free elements in use
-    bound_memory(int(memory))
     scene = load(path)
+    if scene is None:
+        return {"missing": True}
     KEPT.append(scene)
     nodes = elements(scene.nodes)
     number = {node.typed_id: n for n, node in enumerate(nodes)}
@@ -249,20 +256,21 @@ def main(path: str, out: str, animated: str, name: str, rate: str, memory: str) 
         "stacks": stacks(scene, number),
         "notes": notes,
     }
-    chosen = choose(told["stacks"], name) if animated == "yes" else None
+    chosen = choose(told["stacks"], name) if animated else None
     if chosen is not None:
         stack = told["stacks"][chosen]
-        rate_ = float(rate) or stated_rate(settings.frames_per_second)
+        rate_ = rate or stated_rate(settings.frames_per_second)
         rate_ = rate_ if np.isfinite(rate_) and rate_ > 0.0 else 30.0
         count = (stack["end"] - stack["begin"]) * rate_
         if not 0.0 <= count < 1e6:
-            fail(f"animation '{stack['name']}' would have {count:.3g} frames: at most 1000000")
+            raise InputError(f"animation '{stack['name']}' would have {count:.3g} frames: at most 1000000", path=path)
         # as warpjld.motion.frame_times: rounding (23.976, float32) must not lose the last frame
         slack = min(0.01 + 2e-5 * count, 0.4)
         times = np.minimum(stack["begin"] + np.arange(int(np.floor(count + slack)) + 1) / rate_, stack["end"])
-        sample(scene, chosen, times, f"{out}.worlds")
+        sample(scene, chosen, times, folder / FBX_FRAMES)
         told |= {"chosen": stack["name"], "rate": rate_}
-    np.savez(out, told=np.array(json.dumps(told)), **arrays)  # type: ignore[arg-type]
+    np.savez(folder / FBX_ARRAYS, **arrays)  # type: ignore[arg-type]
+    return told
 
 
 def stated_rate(rate: float) -> float:
@@ -288,22 +296,3 @@ def choose(several: list[dict[str, Any]], name: str) -> int | None:
             if stack[wanted]:
                 return i
     return None
-
-
-def bound_memory(limit: int) -> None:
-    try:
-        import resource
-    except ImportError:  # not available on Windows
-        return
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    if hard == resource.RLIM_INFINITY or hard > limit:
-        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
-
-
-if __name__ == "__main__":
-    try:
-        main(*sys.argv[1:])
-    except MemoryError:
-        os._exit(5)
-    sys.stdout.flush()
-    os._exit(0)  # without cleaning up, see the module's docstring

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-import tempfile
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,16 +12,14 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.files.spilled_rows import SpilledRows
-from warpjld.limits import limit
-from warpjld.runtime.separate import too_late, too_much
+from warpjld.io.fbx.extract import FBX_ARRAYS, FBX_FRAMES
+from warpjld.runtime.separate import separately
 
 __all__ = ["FbxMesh", "FbxScene", "FbxSkin", "FbxStack", "read_scene"]
 
 _FURTHEST = 1e12  # largest plausible coordinate in the file's units
 _PER_BYTE = 200
 """Memory for each byte of a file: its elements are Python objects, which are never freed."""
-_NO_LIBRARY, _NO_MEMORY = 4, 5
-"""Exit codes of the reading program if ufbx cannot be imported, and if memory does not suffice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,39 +172,19 @@ def _placed(worlds: SpilledRows, axes: NDArray[np.float64], names: tuple[str, ..
 def _extract(
     path: Path, animated: bool, name: str, rate: float
 ) -> tuple[dict[str, Any], dict[str, NDArray[Any]], SpilledRows | None]:
-    """Output of :mod:`extract`, run as a separate process, since it may crash on a broken file; the transforms of an
+    """What :mod:`extract` finds in a process of its own, since ufbx may crash on a broken file; the transforms of an
     animation are a table with a row per frame."""
-    program = Path(__file__).with_name("extract.py")
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "content.npz"
-        memory, seconds = limit("reader-bytes") + _PER_BYTE * path.stat().st_size, limit("reader-seconds")
-        how = ["yes" if animated else "no", name, str(float(rate)), str(memory)]
-        try:
-            done = subprocess.run(
-                [sys.executable, "-P", str(program), str(path.absolute()), str(out), *how],
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=seconds,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise too_late("FBX", seconds, path) from None
-        last = done.stderr.strip().splitlines()[-1:] or [""]
-        if done.returncode == _NO_LIBRARY:
+    place = ("warpjld.io.fbx.extract", "leave_fbx")
+    with separately(place, path, "FBX", animated, name, rate, per_byte=_PER_BYTE, once=True) as answer:
+        told: dict[str, Any] = answer.value
+        if "missing" in told:
             raise MissingExtraError("FBX", "fbx")
-        if done.returncode == _NO_MEMORY:
-            raise too_much("FBX", memory, path)
-        if done.returncode:
-            why = last[0] if done.returncode > 0 and last[0] else f"the reader ends with code {done.returncode}"
-            raise InputError(f"cannot be read as FBX: {why}", path=path)
-        with np.load(out) as content:
-            arrays = {key: content[key] for key in content.files}
+        with np.load(answer.folder / FBX_ARRAYS) as content:
+            arrays = dict(content)
         worlds = None
-        if (frames := out.with_name(f"{out.name}.worlds")).exists():
+        if "chosen" in told:
             worlds = SpilledRows(16 * len(arrays["shown"]))
-            worlds.extend_from(frames)
-    told: dict[str, Any] = json.loads(str(arrays.pop("told")))
+            worlds.extend_from(answer.folder / FBX_FRAMES)
     return told, arrays, worlds
 
 
