@@ -34,7 +34,7 @@ class Limit:
 
 LIMITS = {
     "file-bytes": Limit(2 << 30, "bytes", "a file that is read"),
-    "json-bytes": Limit(24 << 20, "bytes", "a JSON file, which takes up to six times as much memory"),
+    "json-bytes": Limit(24 << 20, "bytes", "a JSON file read whole, which takes up to six times as much memory"),
     "unpacked-bytes": Limit(1 << 30, "bytes", "what the members of an archive (.npz, .3mf, .usdz) unpack to"),
     "members": Limit(10_000, "members", "an archive"),
     "vertices": Limit(5_000_000, "vertices", "a surface"),

@@ -15,7 +15,7 @@ from warpjld.files.input_file import open_input, read_bytes
 from warpjld.files.nesting import nesting
 from warpjld.limits import check_limit
 
-__all__ = ["parse_json", "read_json", "read_text", "text_lines"]
+__all__ = ["json_integer", "parse_json", "read_json", "read_text", "text_lines"]
 
 
 def read_text(path: str | Path, *, errors: Literal["strict", "replace"] = "strict") -> str:
@@ -65,7 +65,7 @@ def read_json(path: str | Path) -> Any:
     """
     with open_input(path) as file:
         size = os.fstat(file.fileno()).st_size
-    check_limit("json-bytes", size, of="JSON (motions of many frames: as .npz or .bvh)", path=path)
+    check_limit("json-bytes", size, of="JSON", path=path)
     return parse_json(read_text(path), path)
 
 
@@ -73,12 +73,13 @@ def parse_json(text: str, path: str | Path) -> Any:
     """Content of the JSON text of a file; raises as ``read_json``."""
     check_limit("depth", nesting(text.encode("utf-8", "replace")), of="JSON", path=path)
     try:
-        return json.loads(text, parse_int=_integer)
+        return json.loads(text, parse_int=json_integer)
     except json.JSONDecodeError as error:
         raise InputError(f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno) from None
     except RecursionError:  # possible if the limit is raised beyond that of Python's parser
         raise InputError("is not read: its JSON is nested more deeply than Python takes", path=path) from None
 
 
-def _integer(digits: str) -> int | float:
+def json_integer(digits: str) -> int | float:
+    """An integer of a JSON text; a float beyond 64 bits."""
     return int(digits) if len(digits) < 19 else float(digits)

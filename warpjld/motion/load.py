@@ -34,6 +34,7 @@ MOTION_FORMATS = {
     ".usdc": "a UsdSkel animation in binary USD",
     ".usdz": "a UsdSkel animation in a USD package",
     ".json": "tracked hands: WebXR poses, a Leap Motion recording, MediaPipe landmarks, MANO poses",
+    ".jsonl": "tracked hands: MediaPipe landmarks or MANO poses, a frame a line",
     ".npz": "tracked hands: MANO poses or MediaPipe landmarks as NumPy arrays",
     ".npy": "a tracked hand: MANO poses or MediaPipe landmarks as one NumPy array",
 }
@@ -120,7 +121,7 @@ def load_motion(
             moved = _table(path, rig, rate, limits)
         elif suffix == ".bvh":
             moved = _capture(path, rig, rate)
-        elif suffix in (".json", ".npz", ".npy"):
+        elif suffix in (".json", ".jsonl", ".npz", ".npy"):
             moved = _tracked_hands(path, rig, rate, side, flat_hand_mean)
         else:
             moved = _animation(path, rig, rate, animation)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from array import array
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.files.json_pieces import JSON_LISTS
 from warpjld.motion.hand_motion import HandRecording
 from warpjld.motion.mano_rest import MANO_JOINTS
 from warpjld.motion.mano_track import ManoTrack
-from warpjld.motion.stated_times import stated_times
+from warpjld.motion.stated_times import stated_times, time_fields
 
 __all__ = ["is_mano", "mano_hands"]
 
@@ -81,9 +83,9 @@ def mano_hands(
     flat = _flat(found, flat_hand_mean, warnings)
     parts = _parts(found, warnings)
     count = len(next(iter(parts.values()))[1])
-    frames = [{}] * count if not isinstance(fields, list) else [f if isinstance(f, Mapping) else {} for f in fields]
-    listed = next((found[key] for key in _FRAMES if isinstance(found.get(key), list)), None)
-    frames = [f if isinstance(f, Mapping) else {} for f in listed] if listed is not None else frames
+    frames = [time_fields(frame) for frame in fields] if isinstance(fields, JSON_LISTS) else [{}] * count
+    listed = next((found[key] for key in _FRAMES if isinstance(found.get(key), JSON_LISTS)), None)
+    frames = frames if listed is None else [time_fields(frame) for frame in listed]
     # convert only rows of numbers to lists: as a list, the poses of a long recording would need most of the memory
     rows = {name: value for name, value in found.items() if not (isinstance(value, np.ndarray) and value.ndim > 1)}
     about = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in rows.items()}
@@ -112,24 +114,38 @@ def mano_hands(
 def _gathered(fields: Any) -> dict[str, Any]:
     """Fields over all frames: those of a list of frames are stacked, a bare list is one array."""
     if isinstance(fields, Mapping):
-        listed = next((fields[key] for key in _FRAMES if isinstance(fields.get(key), list)), None)
-        if listed and isinstance(listed[0], Mapping):
-            return {key: value for key, value in fields.items() if value is not listed} | _gathered(listed)
+        listed = next((key for key in _FRAMES if isinstance(fields.get(key), JSON_LISTS)), "")
+        if listed and fields[listed] and isinstance(fields[listed][0], Mapping):
+            return {key: value for key, value in fields.items() if key != listed} | _gathered(fields[listed])
         return dict(fields)
-    if not isinstance(fields, list) or not fields:
+    if not isinstance(fields, JSON_LISTS) or not fields:
         return {}
-    if not all(isinstance(frame, Mapping) for frame in fields):
-        return {"": fields}
+    columns: dict[str, list[Any]] = {key: [] for key in fields[0]} if isinstance(fields[0], Mapping) else {}
+    for frame in fields:
+        if not isinstance(frame, Mapping):
+            return {"": fields}
+        for key, column in columns.items():
+            column.append(_packed(frame.get(key)))
     out: dict[str, Any] = {}
-    for key in fields[0]:
-        values = [frame.get(key) for frame in fields]
+    for key, values in columns.items():
         if all(isinstance(value, Mapping) for value in values):
             out[key] = _gathered(values)
-        elif all(value == values[0] for value in values) and not isinstance(values[0], list):
+        elif all(value == values[0] for value in values) and not isinstance(values[0], (list, array)):
             out[key] = values[0]
         else:
             out[key] = values
     return out
+
+
+def _packed(value: Any) -> Any:
+    """A value with its rows of numbers as arrays, which take a quarter of the memory."""
+    if isinstance(value, Mapping):
+        return {key: _packed(inner) for key, inner in value.items()}
+    if not isinstance(value, list) or not value:
+        return value
+    if all(type(one) in (int, float) for one in value):
+        return array("d", value)
+    return [_packed(one) for one in value]
 
 
 def _parts(found: Fields, warnings: list[str]) -> dict[str | None, tuple[Fields, NDArray[np.float64]]]:

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.json_pieces import JSON_LISTS
 from warpjld.motion.hand_motion import HandRecording
 from warpjld.motion.hands_by_side import hands_by_side
 from warpjld.motion.seen_hands import SeenHand, recording_of
-from warpjld.motion.stated_times import stated_times
+from warpjld.motion.stated_times import stated_times, time_fields
 
 __all__ = ["MEDIAPIPE_JOINTS", "is_mediapipe", "mediapipe_arrays", "mediapipe_hands"]
 
@@ -54,9 +55,10 @@ def is_mediapipe(content: Any) -> bool:
     """Whether JSON content holds hand landmarks: frames of them, or a field with one of MediaPipe's names."""
     if isinstance(content, Mapping) and any(key in content for key in _WORLD + _STEMS):
         return True
-    if any(hands_by_side(frame) for frame in (_frames(content) or [content])):
+    frames = _frames(content)
+    if any(hands_by_side(frame) for frame in (frames or [content])):
         return True
-    first = next((frame for frame in _frames(content) if frame), None)
+    first = next((frame for frame in frames if frame), None)
     first = first[0] if isinstance(first, list) and first and isinstance(first[0], Mapping) else first
     if isinstance(first, Mapping):
         return "hands" in first or any(key in first for key in _WORLD + _STEMS)
@@ -81,7 +83,7 @@ def mediapipe_hands(content: Any, rate: float | None = None) -> HandRecording:
         InputError: No hand in any frame, or landmarks that are not 21 points, with the frame's number.
     """
     frames = _frames(content)
-    timed = [f if isinstance(f, Mapping) else {} for f in frames]
+    timed = [time_fields(frame) for frame in frames]
     return _hands(content if isinstance(content, Mapping) else {}, frames, timed, rate)
 
 
@@ -105,7 +107,8 @@ def _hands(
             )
         else:
             scale = np.array([size[0], size[1], size[0]])
-            seen = [[replace(hand, points=hand.points * scale) for hand in hands] for hands in seen]
+            for hands in seen:
+                hands[:] = [replace(hand, points=hand.points * scale) for hand in hands]
     return recording_of(seen, MEDIAPIPE_JOINTS, times, rate, notes)
 
 
@@ -165,22 +168,40 @@ class _ArrayFrames(Sequence[Any]):
         return {name: array[frame].tolist() for name, array in self._fields.items()}
 
 
-def _frames(content: Any) -> list[Any]:
+class _Named(Sequence[Any]):
+    """Frames as objects with one field, created on demand."""
+
+    def __init__(self, key: str, items: Sequence[Any]) -> None:
+        self._key, self._items = key, items
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __getitem__(self, frame: Any) -> Any:
+        return {self._key: self._items[frame]}
+
+
+def _frames(content: Any) -> Sequence[Any]:
     """Frames of a recording; a single result is one frame."""
     if isinstance(content, Mapping):
-        listed = next((content[key] for key in _FRAMES if isinstance(content.get(key), list)), None)
+        listed = next((content[key] for key in _FRAMES if isinstance(content.get(key), JSON_LISTS)), None)
         if listed is None and (key := _has(content, _WORLD) or _has(content, _STEMS)):
             try:
                 many = np.shape(content[key])[1:] == (_COUNT, 3) and np.shape(content[key])[0] > 2
             except ValueError:
                 many = False
-            return [{key: one} for one in content[key]] if many else [content]
+            return _Named(key, content[key]) if many else [content]
         return [content] if listed is None and hands_by_side(content) else listed or []
-    if isinstance(content, list) and content and isinstance(content[0], (int, float)):
+    if isinstance(content, JSON_LISTS) and content and isinstance(content[0], (int, float)):
         return []
-    if isinstance(content, list) and len(content) == _COUNT and not _is_hand(content[0]) and _is_point(content[0]):
+    if (
+        isinstance(content, JSON_LISTS)
+        and len(content) == _COUNT
+        and not _is_hand(content[0])
+        and _is_point(content[0])
+    ):
         return [content]
-    return content if isinstance(content, list) else []
+    return content if isinstance(content, JSON_LISTS) else []
 
 
 def _hands_of(frame: Any, about: Mapping[str, Any]) -> list[SeenHand]:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.files.json_pieces import JSON_LISTS
 
-__all__ = ["DEFAULT_RATE", "stated_times"]
+__all__ = ["DEFAULT_RATE", "stated_times", "time_fields"]
 
 DEFAULT_RATE = 30.0  # frames a second; its use is noted
 
@@ -64,6 +65,11 @@ def stated_times(
     return np.arange(count) / value, value
 
 
+def time_fields(frame: Any) -> dict[str, Any]:
+    """Those fields of a frame that ``stated_times`` reads; none where it is no object."""
+    return {key: frame[key] for key in _STAMPS if key in frame} if isinstance(frame, Mapping) else {}
+
+
 def _stamps(
     about: Mapping[str, Any], frames: Sequence[Mapping[str, Any]]
 ) -> tuple[NDArray[np.float64] | None, float | None]:
@@ -73,8 +79,9 @@ def _stamps(
     """
     for key in _STAMPS:
         values = about.get(key)
-        if not isinstance(values, list):
+        if not isinstance(values, JSON_LISTS):
             values = [frame.get(key) for frame in frames]
+        values = list(values)
         where = [k for k, value in enumerate(values) if value is not None]
         if len(values) != len(frames) or len(where) < min(2, len(frames)):
             continue

@@ -54,10 +54,10 @@ def webxr_hands(content: Mapping[str, Any]) -> HandRecording:
         InputError: A joint is missing or its matrix is invalid, with its name; or contradictory sides.
     """
     stated = _side(content.get("handedness"), "the file")
-    found: dict[str | None, dict[str, Mapping[str, Any]]] = {}
+    found: dict[str | None, dict[str, NDArray[np.float64]]] = {}
     for name, above, pose in _poses(content):
         side = above or _side(pose.get("handedness"), f"pose '{name}'") or stated
-        found.setdefault(side, {})[name] = pose
+        found.setdefault(side, {})[name] = _places(name, pose)
     if set(found) == {None}:
         named = {name: _named_side(name) for name in found[None]}
         if None not in named.values():
@@ -100,14 +100,16 @@ def _side(stated: Any, where: str) -> str | None:
     return side
 
 
-def _track(side: str | None, poses: Mapping[str, Mapping[str, Any]]) -> HandTrack:
-    places = [
-        {canonical: _place(name, pose, joint) for joint, canonical in WEBXR_JOINTS.items()}
-        for name, pose in poses.items()
-    ]
-    points = {joint: np.array([place[joint] for place in places]) for joint in WEBXR_JOINTS.values()}
+def _track(side: str | None, poses: Mapping[str, NDArray[np.float64]]) -> HandTrack:
+    places = np.array(list(poses.values()))
+    points = {joint: places[:, k] for k, joint in enumerate(WEBXR_JOINTS.values())}
     times = np.arange(len(places), dtype=np.float64)
     return HandTrack(side, times, points, moves=False, labels=tuple(f"pose '{name}'" for name in poses))
+
+
+def _places(name: str, pose: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Positions of a pose's joints, shape (25, 3)."""
+    return np.array([_place(name, pose, joint) for joint in WEBXR_JOINTS])
 
 
 def _place(pose_name: str, pose: Mapping[str, Any], joint: str) -> NDArray[np.float64]:
