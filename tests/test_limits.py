@@ -168,10 +168,7 @@ def test_json_that_is_read_whole_is_limited_by_memory(tmp_path: Path, monkeypatc
         "a.nas": "GRID*   1\nBEGIN BULK\n$ Nastran file",
     }.items(),
 )
-def test_a_mesh_whose_reader_never_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, content: str
-) -> None:
-    monkeypatch.setenv("WARPJLD_LIMIT_MESH_SECONDS", "1")
+def test_a_cut_mesh_on_which_meshio_reads_for_ever_is_refused(tmp_path: Path, name: str, content: str) -> None:
     (tmp_path / name).write_text(content)
-    with pytest.raises(InputError, match=rf"{name}: cannot be read as .*: not done after 1 s .*mesh-seconds="):
+    with pytest.raises(InputError, match=rf"{name}: cannot be read as {name[2:].upper()}: .*(ends before|reshape)"):
         read_mesh(tmp_path / name)

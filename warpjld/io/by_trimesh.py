@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.files.archive import check_archive
 from warpjld.geometry.surface import Part
+from warpjld.io.meshio_end import stop_at_end
 from warpjld.io.meshio_process import with_meshio
 from warpjld.limits import check_limit
 
@@ -67,6 +68,7 @@ def load_trimesh_surface(path: Path) -> TrimeshSurface:
 
 def leave_trimesh_surface(folder: Path, path: Path) -> list[Any]:
     """In the process: write the arrays of a surface to the folder, and return its parts."""
+    stop_at_end()
     found = _surface(path)
     arrays = {"vertices": found.vertices, "faces": found.faces} | ({} if found.uv is None else {"uv": found.uv})
     np.savez(folder / _FILE, **arrays)  # type: ignore[arg-type]

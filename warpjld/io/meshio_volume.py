@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from warpjld.errors import InputError
+from warpjld.io.meshio_end import stop_at_end
 
 __all__ = ["VOLUME_FILE", "leave_volume_mesh"]
 
@@ -29,6 +30,7 @@ def leave_volume_mesh(folder: Path, path: Path, scale: float) -> list[str]:
     """
     import meshio
 
+    stop_at_end()
     said = io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):  # meshio prints what is wrong, and exits
