@@ -100,8 +100,8 @@ def deform_command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...],
 
     RIG is a rig file (.glb, .gltf, .vrm, .fbx, .usd), a surface with --skeleton, or builtin:left or builtin:right for
     the built-in hand. A MOTION is .bvh, .csv, a file with animations (.glb, .gltf, .vrma, .fbx, .usd) or a recording
-    of hands (.json, .npz, .npy). With --format or --motion-format it is a batch of any number of clips: RIG is bound
-    once, clips are made in several processes, a clip that fails does not end the others, and the same command
+    of hands (.json, .jsonl, .npz, .npy). With --format or --motion-format it is a batch of any number of clips: RIG is
+    bound once, clips are made in several processes, a clip that fails does not end the others, and the same command
     continues where it was stopped. manifest.json lists inputs and outputs of every clip.
     """
     from warpjld.batch import clip_jobs

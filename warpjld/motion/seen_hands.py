@@ -90,7 +90,9 @@ def recording_of(
             row = {0: row[frames[0]]} | row | {len(seen) - 1: row[frames[-1]]}
             frames = list(row)
         points = np.array([one.points for one in row.values()])
-        unsure = np.array([one.sure for one in row.values()]) < _SURE
+        unsure = np.empty(points.shape[:2], dtype=bool)
+        for number, one in enumerate(row.values()):
+            unsure[number] = one.sure < _SURE
         for landmark in np.flatnonzero(unsure.any(axis=0)).tolist():
             good = ~unsure[:, landmark]
             if not good.any():
