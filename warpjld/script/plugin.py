@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import CodeType
 
 from warpjld.errors import InputError, WarpjldError
 
@@ -20,8 +22,8 @@ def load_commands(path: Path) -> None:
     if not path.is_file():
         raise InputError("cannot read commands: no such file", path=path)
     name = f"warpjld_commands_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
+    spec = importlib.util.spec_from_file_location(name, path, loader=_Uncached(name, str(path)))
+    if path.suffix != ".py" or spec is None or spec.loader is None:
         raise InputError("want a Python file (.py)", path=path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
@@ -33,6 +35,14 @@ def load_commands(path: Path) -> None:
         raise
     except Exception as error:
         raise InputError(f"{type(error).__name__}: {error}", path=path, line=_line(error, path)) from error
+
+
+class _Uncached(SourceFileLoader):
+    """Loader without bytecode, which is taken for a file's if size and time in seconds are: a file that is changed and
+    tried at once would be the old one."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.get_data(self.path), self.path)
 
 
 def _line(error: BaseException, path: Path) -> int | None:
