@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -172,3 +174,12 @@ def test_a_cut_mesh_on_which_meshio_reads_for_ever_is_refused(tmp_path: Path, na
     (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=rf"{name}: cannot be read as {name[2:].upper()}: .*(ends before|reshape)"):
         read_mesh(tmp_path / name)
+
+
+def test_readers_are_stopped_at_the_end_by_one_wrapper_however_many_files_a_process_reads() -> None:
+    pytest.importorskip("meshio")
+    code = (
+        "import meshio; from warpjld.io.meshio_end import stop_at_end; stop_at_end(); once = meshio._files.open_file; "
+        "stop_at_end(); assert meshio._files.open_file is once"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 __all__ = ["stop_at_end"]
@@ -12,6 +13,7 @@ __all__ = ["stop_at_end"]
 _EMPTY = 1000  # reads at the end of a file after which its reader does not notice; those that do need one or two
 
 
+@cache  # a process reads many files: once is enough, and each time would wrap what is wrapped
 def stop_at_end() -> None:
     """Make all readers of meshio in this process fail with ``EOFError`` when they read on behind the end of a file."""
     import meshio

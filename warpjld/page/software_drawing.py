@@ -48,23 +48,23 @@ _SCRIPT = """<script>
     timer = setTimeout(rest, REST);
   };
   for (const pointer of ["pointer", "mouse"]) {  // what is dragged is laid out anew at each: not more than needed
-    let last = -Infinity, timer = 0, waiting = null;
+    let last = -Infinity, delay = 0, waiting = null;
     const flush = () => {  // the last position, at the latest before the mouse is released
       const given = waiting;
-      clearTimeout(timer);
+      clearTimeout(delay);
       waiting = null;
       last = -Infinity;
       given?.();
     };
     addEventListener(pointer + "move", event => {
       const left = last + BETWEEN_MOVES - performance.now(), target = event.target;
-      clearTimeout(timer);
+      clearTimeout(delay);
       waiting = null;
       if (event.buttons === 0 || left <= 0) { last = performance.now(); return; }
       event.stopImmediatePropagation();
       const again = new event.constructor(event.type, event);
       waiting = () => target.dispatchEvent(again);
-      timer = setTimeout(flush, left);
+      delay = setTimeout(flush, left);
     }, true);
     for (const kind of ["up", "cancel"]) addEventListener(pointer + kind, flush, true);
     addEventListener("blur", flush, true);

@@ -16,8 +16,9 @@ from warpjld.fem.mesh.shape import CENTRE_GRADIENT, shape_at, slope_at
 __all__ = ["Embedding", "embed", "embed_between"]
 
 _NEAR = 12
-_STILL = 1e-12  # change of reference coordinates after which the next, as Newton converges, is rounding
 """Candidate elements for each point, by distance of their centres."""
+_STILL = 1e-12
+"""Change of reference coordinates after which the next, as Newton's method converges, is rounding."""
 
 
 @dataclass(frozen=True, eq=False)

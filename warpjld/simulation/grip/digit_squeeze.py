@@ -14,7 +14,7 @@ from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.grip.shared_force import PressedDigits
+from warpjld.simulation.grip.shared_force import SAME_CLOSING, PressedDigits
 from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.sensitivity.effort_slope import EffortTangent
@@ -24,9 +24,6 @@ from warpjld.skeleton import Poses
 from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["DigitSqueeze"]
-
-_SAME = 1e-9
-"""Tolerance for equal closings [rad]."""
 
 Array = NDArray[np.float64]
 
@@ -97,18 +94,20 @@ class DigitSqueeze:
 
     def known(self, grips: Array) -> ContactInstant | None:
         """The equilibrium at closings that were tried; None if it was not found."""
-        found = [closed for at, closed in self._known if np.abs(at - grips).max() < _SAME]
-        return found[0].last if found else None
+        found = self._tried(grips)
+        return None if found is None else found.last
+
+    def _tried(self, grips: Array) -> ContactSolution | None:
+        return next((closed for at, closed in self._known if np.abs(at - grips).max() < SAME_CLOSING), None)
 
     def _closed(self, grips: Array) -> ContactSolution | None:
         """Equilibrium at closings, reached from the nearest known one at which no digit is bent further.
 
         Friction remembers its way, and the keys that are found close the digits without opening them again.
         """
-        same = [closed for at, closed in self._known if np.abs(at - grips).max() < _SAME]
-        if same:
-            return same[0]
-        below = [one for one in self._known if (one[0] <= np.maximum(grips, 0.0) + _SAME).all()]
+        if (same := self._tried(grips)) is not None:
+            return same
+        below = [one for one in self._known if (one[0] <= np.maximum(grips, 0.0) + SAME_CLOSING).all()]
         at, before = max(below, key=lambda one: float(one[0].sum()))
 
         def moves(share: float) -> Moves:
@@ -153,7 +152,9 @@ class DigitSqueeze:
         for joints in self._joints:
             along = np.zeros_like(angles)
             now = angles[joints, FLEXION]
-            along[joints, FLEXION] = (now < self._bounds[joints, 1] - _SAME) & (now > self._bounds[joints, 0] + _SAME)
+            along[joints, FLEXION] = (now < self._bounds[joints, 1] - SAME_CLOSING) & (
+                now > self._bounds[joints, 0] + SAME_CLOSING
+            )
             out.append(along)
         return out
 

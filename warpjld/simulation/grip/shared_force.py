@@ -20,7 +20,7 @@ from warpjld.errors import InputError
 from warpjld.fem.hand.stiffening import ForceSlope, way_to
 from warpjld.simulation.grip.force import ForceStatus
 
-__all__ = ["PressedDigits", "SharedGrip", "share_force"]
+__all__ = ["SAME_CLOSING", "PressedDigits", "SharedGrip", "share_force"]
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ _TOTAL = 30.0
 """Weight of the total force in least squares, beside each digit's share: nearly a constraint."""
 _SINGULAR = 1e4
 """Condition number above which the digits cannot press apart from one another."""
-_SAME = 1e-9
+SAME_CLOSING = 1e-9
 """Tolerance for equal closings [rad]."""
 
 
@@ -131,7 +131,7 @@ def share_force(
         if status is not None:
             return search.ended(status, tolerance)
         ahead = search.next()
-        if np.abs(ahead - grips).max() < _SAME:
+        if np.abs(ahead - grips).max() < SAME_CLOSING:
             break
         grips = ahead
     reached = any(search.sums_up(found, tolerance) for _, found in search.trials)
@@ -161,8 +161,8 @@ class _Search:
         for _ in range(len(grips) + 1):  # terminates: every round takes out a digit
             left = self.force - float(found.forces[~able].sum())
             share = max(left, 0.0) / float(at[able].sum()) if able.any() else 0.0
-            spent = (grips >= self.high - _SAME) & (found.shares < share)
-            open_ = (grips <= self.low + _SAME) & (found.shares > share)
+            spent = (grips >= self.high - SAME_CLOSING) & (found.shares < share)
+            open_ = (grips <= self.low + SAME_CLOSING) & (found.shares > share)
             if not (able & (spent | open_)).any():
                 break
             able &= ~(spent | open_)
@@ -246,7 +246,7 @@ class _Search:
         grips, found = self.trials[-1]
         now, other = ForceSlope(float(found.shares[d]), float(slope)), None
         for there, known in self.trials[-2::-1]:
-            if known.slopes is not None and abs(there[d] - grips[d]) > _SAME and self.pressing(known)[d]:
+            if known.slopes is not None and abs(there[d] - grips[d]) > SAME_CLOSING and self.pressing(known)[d]:
                 if known.slopes[d, d] > 0.0 and found.slopes is not None:
                     other = ForceSlope(float(known.shares[d]), float(known.slopes[d, d]))
                 break
