@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from tests.motion.skeletons import hand
@@ -80,6 +80,10 @@ channels = st.sampled_from(["index.base.flexion", "left.thumb.base.abduction", "
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@example(
+    keys={("index.base.flexion", 0): 0.0, ("index.base.flexion", 1): 3.0, ("index.base.flexion", 3): 3.0 - 4e-16},
+    tension=0.0,
+)
 @given(
     st.dictionaries(st.tuples(channels, st.integers(0, 40)), st.floats(-3, 3), min_size=1, max_size=12),
     st.sampled_from([0.0, 0.4]),

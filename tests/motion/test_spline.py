@@ -118,3 +118,10 @@ def test_bad_keys_are_explained(times: list, key_values: list, message: str) -> 
 def test_wrong_number_of_constants() -> None:
     with pytest.raises(InputError, match="tension needs one finite number or 2"):
         Spline([0, 1], [0, 1], tension=[0, 0, 0])
+
+
+@given(st.floats(-3, 3), st.floats(-1e-6, 1e-6))
+def test_neighbours_that_are_nearly_equal_give_nearly_the_same_curve(level: float, off: float) -> None:
+    times, dense = np.array([0.0, 1.0, 3.0, 4.0]), np.linspace(0.0, 4.0, 81)
+    held = Spline(times, [0.0, level, level, 1.0])(dense)
+    np.testing.assert_allclose(Spline(times, [0.0, level, level + off, 1.0])(dense), held, atol=2e3 * abs(off) + 1e-9)

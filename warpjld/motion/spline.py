@@ -11,6 +11,11 @@ from warpjld.errors import InputError
 __all__ = ["Spline"]
 
 
+_LEVEL = 1e-3
+"""Chord relative to the larger one beside it below which tangents fade: values that differ by less look equal, and
+digits lost in a file (12 are written) still make no difference."""
+
+
 class Spline:
     """An interpolating cubic spline, with tension t, continuity c and bias b at every key.
 
@@ -24,7 +29,8 @@ class Spline:
     missing chord is the mirror image of the present one. Outside the keys the spline is constant.
 
     Between two equal neighbouring keys that both have the default constants the value is held, instead of the small
-    overshoot of the formula; constants other than zero, or ``hold=False``, give the formula everywhere.
+    overshoot of the formula; constants other than zero, or ``hold=False``, give the formula everywhere. Tangents fade
+    where neighbours become equal, so that the curve is continuous in the values.
 
     Args:
         times: Key times, finite and increasing, shape (K,).
@@ -110,10 +116,17 @@ def _cubics(
     leaving = relaxed * ((1.0 + c) * (1.0 + b) * before + (1.0 - c) * (1.0 - b) * after)
     if hold:
         default = (t == 0.0) & (c == 0.0) & (b == 0.0)
-        level = (chords == 0.0) & default[1:] & default[:-1]
-        still = np.concatenate([level, [False]]) | np.concatenate([[False], level])
-        arriving, leaving = np.where(still, 0.0, arriving), np.where(still, 0.0, leaving)
+        moves = np.where(default[1:] & default[:-1], _moving(np.abs(chords)), 1.0)
+        share = np.minimum(np.concatenate([moves, [1.0]]), np.concatenate([[1.0], moves]))
+        arriving, leaving = share * arriving, share * leaving
     slope = chords / lengths
     start, end = leaving[:-1], arriving[1:]
     square = (3.0 * slope - 2.0 * start - end) / lengths
     return np.array([(start + end - 2.0 * slope) / lengths**2, square, start, v[:-1]])
+
+
+def _moving(chords: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of its tangents that an interval keeps, from the lengths of all chords: 0 between equal values, 1 where
+    they clearly differ; shape (K - 1,)."""
+    beside = np.maximum(np.concatenate([[0.0], chords[:-1]]), np.concatenate([chords[1:], [0.0]]))
+    return np.where(chords > 0.0, np.minimum(chords / np.maximum(_LEVEL * beside, 1e-300), 1.0), 0.0)
