@@ -22,11 +22,12 @@ from warpjld.covering.rigid import part_of_surface, without_rigid
 from warpjld.covering.rows import Rows, pose_on, rows_of, rows_on
 from warpjld.covering.runs import Columns, Runs, pack_runs, palette
 from warpjld.covering.swelling import volume_keeping
-from warpjld.covering.thickness import thickness
+from warpjld.covering.thickness import mean_thickness, thickness
 from warpjld.covering.thinning import thinned
 from warpjld.errors import InputError
 from warpjld.geometry.surface import Surface
 from warpjld.runtime.threads import threads_for
+from warpjld.skeleton.digits import is_digit
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 
@@ -104,10 +105,24 @@ class Covering:
         """Diffusion of fields over the flesh, with its thickness as the length scale."""
         flesh = np.flatnonzero(self.anchors.rigid < 0)
         vertices, faces = part_of_surface(self.surface.vertices, self.surface.faces, flesh)
+        return Diffusion(vertices, faces, self._reach(vertices, faces, flesh), flesh)
+
+    def _reach(
+        self, vertices: NDArray[np.float64], faces: NDArray[np.int32], flesh: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Length scale of the diffusion at every vertex of the flesh [m], shape (n,).
+
+        Outside digits at least the mean thickness around: skin close to a bone, as on top of a shoulder, would else
+        fold. Knuckles, which are close to bones too, may show, and digits keep more of their volume so.
+        """
+        own = thickness(self.anchors, self.skeleton.rest)[flesh]
+        digits, stiff = (
+            self.domains[flesh] @ np.array([kind(fan) for fan in self.fans], dtype=np.float64)
+            for kind in (lambda fan: is_digit(fan.name), lambda fan: fan.stiff)
+        )
+        reach = own + (1.0 - digits) * np.maximum(mean_thickness(vertices, faces, own) - own, 0.0)
         # a skull does not bend, so it needs less smoothing, and lids must stay on the eyes
-        stiff = self.domains[flesh][:, [fan.stiff for fan in self.fans]].sum(axis=1)
-        reach = thickness(self.anchors, self.skeleton.rest)[flesh] * (1.0 - _STIFF * stiff)
-        return Diffusion(vertices, faces, reach, flesh)
+        return np.asarray(reach * (1.0 - _STIFF * stiff))
 
     @cached_property
     def following(self) -> Following | None:

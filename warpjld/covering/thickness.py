@@ -1,4 +1,4 @@
-"""Thickness of the flesh at every vertex: distance of the skin from its segments."""
+"""Thickness of the flesh at every vertex: distance of the skin from its segments, and the mean of it around."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.binding import Anchors
+from warpjld.covering.heat import diffused
 
-__all__ = ["thickness"]
+__all__ = ["mean_thickness", "thickness"]
+
+_REACH = 1.2
+"""Diffusion length of the mean, per thickness: half around a limb, so that opposite sides share their values."""
 
 
 def thickness(anchors: Anchors, joints: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -24,3 +28,19 @@ def thickness(anchors: Anchors, joints: NDArray[np.float64]) -> NDArray[np.float
     foot = start + anchors.ratio[..., None] * (end - start)
     distance = np.linalg.norm(anchors.rest[:, None] - foot, axis=2)
     return np.asarray((anchors.weight * distance).sum(axis=1))
+
+
+def mean_thickness(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], own: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Thickness averaged over the surface around every vertex [m], shape (V,).
+
+    A bone that runs close to one side of a limb, as at the top of a shoulder, is near the skin there, but that skin
+    slides over flesh as thick as on the other side.
+
+    Args:
+        vertices: Rest positions [m], shape (V, 3).
+        faces: Triangles, shape (T, 3).
+        own: Distance of the skin from its segments [m], shape (V,).
+    """
+    return diffused(own, vertices, faces, (_REACH * own) ** 2) if len(faces) else own

@@ -5,7 +5,7 @@ from __future__ import annotations
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["digit_joints"]
+__all__ = ["digit_joints", "is_digit"]
 
 
 def digit_joints(skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
@@ -20,3 +20,9 @@ def digit_joints(skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
             if joints := tuple(skeleton.names.index(name) for name in names if name in skeleton.names):
                 found[f"{side}{digit}"] = joints
     return found
+
+
+def is_digit(name: str) -> bool:
+    """Whether a joint of this canonical name belongs to a finger, a thumb or a toe."""
+    digit = name.removeprefix("left.").removeprefix("right.").partition(".")[0]
+    return digit in DIGITS or digit.startswith("toe")

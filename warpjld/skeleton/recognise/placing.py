@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.geometry.coincident import close_pairs, connected_parts
 from warpjld.geometry.winding import winding_numbers
-from warpjld.skeleton.hand import DIGITS
+from warpjld.skeleton.digits import is_digit
 from warpjld.skeleton.recognise.complete_body import find_extremities
 from warpjld.skeleton.recognise.expected import body_expectations
 from warpjld.skeleton.recognise.expected_digits import finger_expectations
@@ -302,7 +302,7 @@ def _check_sections(
     out = []
     for k, (j, (up, down, left, right, ahead)) in enumerate(zip(joints, reach, strict=True)):
         name = skeleton.names[j]
-        digit = _in_digit(name)
+        digit = is_digit(name)
         if digit:
             out += _check_digit(name, bone[k], axis[k], up, down)
         ratios = []
@@ -322,11 +322,6 @@ def _check_sections(
                 offset = (ahead - half) * bone[k]
                 out.append(Finding(name, "extremity", float(pad), detail, _millimetres(offset)))
     return out
-
-
-def _in_digit(name: str) -> bool:
-    digit = name.removeprefix("left.").removeprefix("right.").partition(".")[0]
-    return digit in DIGITS or digit.startswith("toe")
 
 
 def _check_digit(
