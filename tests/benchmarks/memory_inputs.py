@@ -33,6 +33,7 @@ INPUTS = (
 )
 """Files of one motion, each in another format."""
 
+_LEFT = '{"handedness": "Left", "frames": ['
 _PERIOD = 50  # frames after which a recording repeats
 _FINGERS = ("index", "middle", "ring", "pinky")
 _BENDS = {"base": 60.0, "knuckle2": 80.0, "knuckle3": 40.0}  # degrees

@@ -21,8 +21,8 @@ __all__ = ["ArrayArchive"]
 class ArrayArchive:
     """An archive that is being written, one array after the other; ``np.load`` reads it.
 
-    Used in a ``with`` statement, or ended by ``close`` or ``discard``. Members are not compressed and carry no time, so that equal
-    arrays give equal bytes.
+    Used in a ``with`` statement, or ended by ``close`` or ``discard``. Members are not compressed and carry no time, so
+    that equal arrays give equal bytes.
 
     Args:
         path: The file, which is created; callers write to a temporary one (see ``whole_file``).
