@@ -1,6 +1,6 @@
 """Long motions of the built-in left hand in every format that is read, for the benchmark of memory.
 
-    python -m tests.benchmarks.memory_inputs FOLDER FRAMES
+    python -m tests.benchmarks.memory_inputs FOLDER FRAMES NAME
 
 Fingers bend back and forth; every frame differs from the next. A short motion is repeated in the recordings.
 """
@@ -13,25 +13,22 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+import pygltflib as gl
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 import warpjld as wj
+from tests.fuzz.sound import _skinned
 from tests.io import fbx_text
 from tests.io.vrm_files import with_humanoid
+from tests.motion import skinned_files
 from tests.motion.hand_files import camera_landmarks, webxr_poses
 from tests.motion.test_hand_sides import leap_frames
 from warpjld.motion.out import write_motion
 from warpjld.skeleton import Poses, poses_from_angles
 from warpjld.skeleton.streamed_poses import streamed_rows
 
-__all__ = ["INPUTS", "RIG", "make"]
-
-RIG = "hand.glb"
-INPUTS = (
-    *("m.bvh", "m.csv", "m.glb", "m.vrma", "m.fbx", "m.usda", "m.usdc"),
-    *("mano.npz", "mano.json", "points.npy", "points.json", "points.jsonl", "leap.json", "webxr.json"),
-)
-"""Files of one motion, each in another format."""
+__all__ = ["make"]
 
 _LEFT = '{"handedness": "Left", "frames": ['
 _PERIOD = 50  # frames after which a recording repeats
@@ -39,13 +36,13 @@ _FINGERS = ("index", "middle", "ring", "pinky")
 _BENDS = {"base": 60.0, "knuckle2": 80.0, "knuckle3": 40.0}  # degrees
 
 
-def make(folder: Path, frames: int, wanted: tuple[str, ...] = INPUTS) -> None:
-    """Write the rig and the motions to a folder."""
+def make(folder: Path, frames: int, name: str) -> None:
+    """Write a file to a folder: ``hand.glb``, the rig; ``finger.glb``, another one with its motion; or a motion."""
     hand = wj.build_hand("left", resolution=1500)
-    poses = _poses(hand, frames)
-    write_motion(folder / RIG, hand, _poses(hand, 1), rate=30.0)
+    poses = _poses(hand, 1 if name == "hand.glb" else frames)
     period = _poses(hand, _PERIOD)[:_PERIOD]
     makers: dict[str, Callable[[Path], object]] = {
+        "finger.glb": lambda path: _finger(path, frames),
         "m.csv": lambda path: _table(path, frames),
         "m.vrma": lambda path: _vrma(path, hand, poses),
         "m.fbx": lambda path: _fbx(path, hand, poses),
@@ -58,9 +55,11 @@ def make(folder: Path, frames: int, wanted: tuple[str, ...] = INPUTS) -> None:
         "leap.json": lambda path: _leap(path, hand, period, frames),
         "webxr.json": lambda path: _webxr(path, hand, period, frames),
     }
-    for name in wanted:
-        by_writer = lambda path: write_motion(path, hand, poses, rate=30.0)  # noqa: E731
-        makers.get(name, by_writer)(folder / name)
+    other = makers.get(name)
+    if other is None:
+        write_motion(folder / name, hand, poses, rate=30.0)
+    else:
+        other(folder / name)
 
 
 def _angles(frames: NDArray[np.float64], finger: int) -> NDArray[np.float64]:
@@ -82,6 +81,14 @@ def _poses(hand: wj.Rig, count: int) -> Poses:
     return streamed_rows(count, some)
 
 
+def _finger(path: Path, frames: int) -> None:
+    numbers = np.arange(frames, dtype=np.float64)
+    bends = Rotation.from_euler("x", -_angles(numbers, 0)[:, None]).as_quat().astype(np.float32)
+    skinned_files.write(
+        path, _skinned(), {"bend": {(1, "rotation"): ((numbers / 30).astype(np.float32), bends, "LINEAR")}}
+    )
+
+
 def _table(path: Path, frames: int) -> None:
     numbers = np.arange(frames, dtype=np.float64)
     columns = {f"{finger}.{joint}.flexion": most * _angles(numbers, f)
@@ -95,8 +102,6 @@ def _table(path: Path, frames: int) -> None:
 def _vrma(path: Path, hand: wj.Rig, poses: Poses) -> None:
     write_motion(path.with_suffix(".vrma.glb"), hand, poses, rate=30.0)
     parts = {"base": "Proximal", "knuckle2": "Intermediate", "knuckle3": "Distal"}
-    import pygltflib as gl
-
     names = [node.name for node in gl.GLTF2().load_binary(str(path.with_suffix(".vrma.glb"))).nodes]
     bones = {"leftHand": names.index("left.wrist")}
     for finger in _FINGERS:
@@ -165,4 +170,4 @@ def _write(path: Path, head: str, items: Iterator[str], tail: str) -> None:
 
 
 if __name__ == "__main__":
-    make(Path(sys.argv[1]), int(sys.argv[2]), tuple(sys.argv[3:]) or INPUTS)
+    make(Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3])
