@@ -57,6 +57,18 @@ def test_check_makes_nothing(script, tmp_path, capfd) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_check_searches_and_solves_nothing(tmp_path, monkeypatch) -> None:
+    for what in ("grasp.find_grasp.find_grasp", "simulation.simulate.simulate", "covering.kept.bind_kept"):
+        monkeypatch.setattr(f"warpjld.{what}", None)  # whoever calls it fails
+    path = tmp_path / "b.jld"
+    path.write_text(
+        "HAND LEFT BUILTIN RESOLUTION 1500\nOBJECT CUP GLASS 0.065 0.11 AT 0 0 0\nFRAMES 0 8\n"
+        "GRASP 0 8 LEFT CUP AUTO\nPHYSICAL CUP\nFLESH LEFT\nPRESS 0 8\nEXPORT 'a.npz'\n"
+    )
+    assert run(path, "-o", tmp_path / "out", "--check") == 0
+    assert [one.name for one in tmp_path.iterdir()] == ["b.jld"]
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -94,6 +94,23 @@ def test_where_it_cannot_be_removed_kernels_are_kept_elsewhere(cache: Path, monk
     assert moved
 
 
+def test_a_cache_that_cannot_be_written_is_named_and_kernels_are_kept_elsewhere(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import warp
+
+    warp.init()
+    moved: list[bool] = []
+    monkeypatch.setattr(warp.config, "kernel_cache_dir", str(cache))
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    monkeypatch.setattr(quiet, "_move_cache", lambda: moved.append(True))
+    assert quiet._initialised() == [
+        f"kernels cannot be kept ({cache}: permission denied): they are compiled anew; "
+        "WARP_CACHE_PATH names another folder"
+    ]
+    assert moved
+
+
 @pytest.mark.slow
 def test_the_program_tells_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text("frame,index.base.flexion\n0,0\n3,40\n")

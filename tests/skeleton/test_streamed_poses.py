@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +9,7 @@ import pytest
 
 from tests.finger import finger
 from tests.motion import skinned_files
+from tests.peak import peak
 from warpjld.errors import InputError
 from warpjld.script import Interpreter, Scene
 from warpjld.script.crowd import Crowd, role_of
@@ -97,16 +95,6 @@ def test_outermost_points_reach_as_far_as_all(flat: int) -> None:
         assert some[:, axis].max() >= points[:, axis].max() - 1e-12
 
 
-def _peak(*arguments: str) -> float:
-    """Run the program; the most memory that it held [MB]."""
-    code = "import runpy, sys; sys.argv[1:] = sys.argv[2:]; runpy.run_module('warpjld', run_name='__main__')"
-    process = subprocess.Popen([sys.executable, "-c", code, "-", *arguments], env=os.environ | {"OMP_NUM_THREADS": "1"})
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    assert process.returncode == 0
-    return float(usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6)
-
-
 @pytest.mark.slow
 def test_a_hundred_thousand_frames_of_a_hand_within_450_mb(tmp_path: Path) -> None:
     script = tmp_path / "long.jld"
@@ -114,7 +102,7 @@ def test_a_hundred_thousand_frames_of_a_hand_within_450_mb(tmp_path: Path) -> No
         "HAND LEFT BUILTIN RESOLUTION 1500\nFINGER1 LEFT INDEX FLEXION 0 0 1 0\n"
         "FINGER1 LEFT INDEX FLEXION 99999 99999 1 60\nEXPORT 'x.pc2'\n"
     )
-    assert _peak("run", str(script), "-o", str(tmp_path / "out"), "--quiet") < 450.0
+    assert peak("run", str(script), "-o", "out", "--quiet", folder=tmp_path) < 450.0
     assert (tmp_path / "out" / "x.pc2").stat().st_size > 100_000 * 1400 * 12
 
 
@@ -134,5 +122,5 @@ def test_a_million_frames_run(tmp_path: Path) -> None:
         'BODY "rig.glb" UNIT M NAME finger\nFRAMES 0 999999\nMOVE finger 0 0 0 0\n'
         'MOVE finger 999999 0.1 0 0\nEXPORT "x.pc2"\n'
     )
-    assert _peak("run", str(tmp_path / "long.jld"), "-o", str(tmp_path / "out"), "--quiet") < 450.0
+    assert peak("run", "long.jld", "-o", "out", "--quiet", folder=tmp_path) < 450.0
     assert (tmp_path / "out" / "x.pc2").stat().st_size >= 1_000_000 * 12 * 12

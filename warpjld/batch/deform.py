@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ClipFiles", "Deforming", "deform_clip", "frame_span"]
 
-_BLOCK = 16  # frames deformed at a time: memory does not grow with the length of the motion
-
 
 @dataclass(frozen=True, eq=False)
 class Deforming:
@@ -111,6 +109,7 @@ def deform_clip(
     """
     from contextlib import ExitStack
 
+    from warpjld.covering.blocks import FEW_FRAMES
     from warpjld.covering.device import checked_device
     from warpjld.io.caches import open_cache
     from warpjld.motion.out import write_motion
@@ -134,7 +133,8 @@ def deform_clip(
             caches.append(opened.enter_context(cache))
         if caches:
             report("binding", 0, len(poses))
-            for start, block in how.covering.blocks(poses, frames=_BLOCK, device=how.device, threads=how.threads):
+            many = None if contact is None else FEW_FRAMES
+            for start, block in how.covering.blocks(poses, frames=many, device=how.device, threads=how.threads):
                 some = poses[start : start + len(block)]
                 parted = block if contact is None else contact.skin(block, some, first=first + start)
                 for cache in caches:

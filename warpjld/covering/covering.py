@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.binding import Anchors, anchor
+from warpjld.covering.blocks import frames_at_once
 from warpjld.covering.device import checked_device
 from warpjld.covering.diffusion import Diffusion
 from warpjld.covering.drivers import drive
@@ -227,7 +228,7 @@ class Covering:
         self,
         poses: Poses,
         *,
-        frames: int = 16,
+        frames: int | None = None,
         device: str = "cpu",
         threads: int | None = None,
         order: Literal["surface", "runs"] = "surface",
@@ -235,7 +236,9 @@ class Covering:
         """Deform a sequence block by block; yields the first frame and the positions [m] (n, V, 3) of each block.
 
         Every block is a view of one buffer that the next block overwrites, so memory does not grow with the sequence.
+        A block has ``frames`` frames; by default 16, or more of a small surface.
         """
+        frames = frames_at_once(len(self.surface.vertices)) if frames is None else frames
         buffer = np.empty((min(frames, len(poses)), len(self.surface.vertices), 3), dtype=np.float32)
         for start in range(0, len(poses), frames):
             block = poses[start : start + frames]

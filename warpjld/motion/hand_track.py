@@ -67,7 +67,8 @@ class HandTrack:
     @cached_property
     def bends(self) -> NDArray[np.float64]:
         """Bends [rad] of the finger joints for a right hand, shape (K, 4, 3), see ``finger_bends``."""
-        return finger_bends(self.points)
+        starts = range(0, max(len(self.times), 1), BLOCK)
+        return np.concatenate([finger_bends(self[start : start + BLOCK].points) for start in starts])
 
     @property
     def leaning(self) -> str | None:

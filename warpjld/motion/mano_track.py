@@ -14,6 +14,7 @@ from warpjld.motion.hand_motion import IDENTITY, HandPart, HandTurns, hand_joint
 from warpjld.motion.mano_rest import MANO_DIGITS, ManoRest, mano_rest
 from warpjld.skeleton import Skeleton
 from warpjld.skeleton.hand import FINGER_JOINTS
+from warpjld.skeleton.streamed_poses import BLOCK
 
 __all__ = ["ManoTrack"]
 
@@ -54,20 +55,8 @@ class ManoTrack:
     @cached_property
     def bends(self) -> NDArray[np.float64]:
         """Bends [rad] of the finger joints for a right hand, shape (K, 4, 3), from MANO's rest hand with unit bones."""
-        count = len(self.times)
-        points = {"wrist": np.zeros((count, 3))}
-        turns = about(self.pose).reshape(count, len(MANO_DIGITS), 3, 4)
-        for d, digit in enumerate(MANO_DIGITS[:-1]):
-            across = {"index": 1.0, "middle": 0.0, "ring": -1.0, "pinky": -2.0}[digit]
-            at = np.tile([-4.0, 0.0, across], (count, 1))
-            turn = np.tile(IDENTITY, (count, 1))
-            points[f"{digit}.carpometacarpal"] = at + np.array([3.0, 0.0, 0.0])
-            for k, joint in enumerate(FINGER_JOINTS):
-                points[f"{digit}.{joint}"] = at
-                if k < 3:
-                    turn = multiply(turn, turns[:, d, k])
-                    at = at + rotate(turn, [-1.0, 0.0, 0.0])
-        return finger_bends(points)
+        starts = range(0, max(len(self.times), 1), BLOCK)
+        return np.concatenate([_bends(self.pose[start : start + BLOCK]) for start in starts])
 
     def called(self, side: str) -> ManoTrack:
         """The same data, taken as those of a hand of this side."""
@@ -138,3 +127,21 @@ class ManoTrack:
                     local[:, rest.joints[m]] = multiply(conjugate(before), bone)
                     before = bone
         return local
+
+
+def _bends(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bends [rad] at k times, shape (k, 4, 3), from axis-angle vectors, shape (k, 15, 3)."""
+    count = len(pose)
+    points = {"wrist": np.zeros((count, 3))}
+    turns = about(pose).reshape(count, len(MANO_DIGITS), 3, 4)
+    for d, digit in enumerate(MANO_DIGITS[:-1]):
+        across = {"index": 1.0, "middle": 0.0, "ring": -1.0, "pinky": -2.0}[digit]
+        at = np.tile([-4.0, 0.0, across], (count, 1))
+        turn = np.tile(IDENTITY, (count, 1))
+        points[f"{digit}.carpometacarpal"] = at + np.array([3.0, 0.0, 0.0])
+        for k, joint in enumerate(FINGER_JOINTS):
+            points[f"{digit}.{joint}"] = at
+            if k < 3:
+                turn = multiply(turn, turns[:, d, k])
+                at = at + rotate(turn, [-1.0, 0.0, 0.0])
+    return finger_bends(points)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -36,40 +38,72 @@ class Key:
 
 
 class Track:
-    """The keys of one channel; they may be set in any order."""
+    """The keys of one channel; they may be set in any order.
+
+    They are kept as columns of numbers: as objects, the keys of a long table would need most of the memory.
+    """
 
     def __init__(self, channel: str) -> None:
         self.channel = channel
-        self._keys: dict[float, Key] = {}
+        self._frames, self._values = array("d"), array("d")  # by increasing frame
+        self._constants: dict[float, tuple[float, float, float]] = {}  # by frame, where they are not all zero
         self._made: list[Spline] = []  # the spline through these keys, once it was asked for
 
     def __deepcopy__(self, memo: dict[int, object]) -> Track:
-        """A track of its own. Keys never change, and the spline through them is made once for both."""
+        """A track of its own. The spline through the keys is made once for both."""
         other = memo[id(self)] = Track(self.channel)
-        other._keys, other._made = dict(self._keys), self._made
+        other._frames, other._values, other._constants = self._frames[:], self._values[:], dict(self._constants)
+        other._made = self._made
         return other
 
     def set(self, key: Key) -> None:
         """Add a key, or replace the one at its frame."""
-        self._keys[key.frame] = key
+        at = self._at(key.frame)
+        if self._frames[at : at + 1] == array("d", [key.frame]):
+            self._values[at] = key.value
+        else:
+            self._frames.insert(at, key.frame)
+            self._values.insert(at, key.value)
+        constants = key.tension, key.continuity, key.bias
+        self._constants.pop(key.frame, None)
+        if any(constants):
+            self._constants[key.frame] = constants
         self._made = []
 
     def remove(self, frame: float) -> None:
         """Forget the key at a frame, if there is one."""
-        self._keys.pop(frame, None)
+        at = self._at(frame)
+        if self._frames[at : at + 1] == array("d", [frame]):
+            del self._frames[at], self._values[at]
+            self._constants.pop(frame, None)
         self._made = []
+
+    def _at(self, frame: float) -> int:
+        """Index of the first key that is not before a frame."""
+        last = len(self._frames) - 1
+        return last + 1 if last < 0 or self._frames[last] < frame else bisect_left(self._frames, frame)
 
     @property
     def keys(self) -> tuple[Key, ...]:
         """The keys, by increasing frame."""
-        return tuple(self._keys[frame] for frame in sorted(self._keys))
+        rows = zip(self._frames, self._values, strict=True)
+        return tuple(Key(frame, value, *self._constants.get(frame, ())) for frame, value in rows)
+
+    @property
+    def frames(self) -> tuple[float, ...]:
+        """Frames of the keys, increasing."""
+        return tuple(self._frames)
 
     @property
     def spline(self) -> Spline:
         """The spline through the keys."""
         if not self._made:
-            rows = ((k.frame, k.value, k.tension, k.continuity, k.bias) for k in self.keys)
-            self._made.append(Spline(*zip(*rows, strict=True)))
+            frames, values = np.array(self._frames), np.array(self._values)
+            constants: tuple[ArrayLike, ...] = ()
+            if self._constants:
+                plain = (0.0, 0.0, 0.0)
+                constants = tuple(np.array([self._constants.get(frame, plain) for frame in self._frames]).T)
+            self._made.append(Spline(frames, values, *constants))
         return self._made[0]
 
 
@@ -184,8 +218,8 @@ class Motion:
         """First and last frame; (0, 0) without keys."""
         if self.span is not None:
             return self.span
-        frames = [key.frame for track in self.tracks.values() for key in track.keys]
-        return (min(frames), max(frames)) if frames else (0.0, 0.0)
+        keyed = [frames for track in self.tracks.values() if (frames := track.frames)]
+        return (min(one[0] for one in keyed), max(one[-1] for one in keyed)) if keyed else (0.0, 0.0)
 
     @property
     def frames(self) -> NDArray[np.float64]:

@@ -192,12 +192,12 @@ def write_keys(actor: Actor, edit: AngleEdit) -> None:
     channel = f"{actor.skeleton.names[edit.joint]}.{CHANNELS[FLEXION]}"
     track = actor.motion.tracks[channel]
     if edit.frame is None:
-        later = sorted((key for key in track.keys if key.frame > edit.kept), key=lambda key: key.frame)
+        later = [key for key in track.keys if key.frame > edit.kept]
         for key in later:  # a digit that stopped may not have reached the angle that later keys hold
             if key.value == later[0].value:
                 track.set(replace(key, value=edit.value))
         return
-    first = min(key.frame for key in track.keys)
+    first = track.frames[0]
     before = np.unique([*np.arange(np.ceil(first), edit.kept + 1e-9), edit.kept])
     kept = actor.motion.value(channel, before)
     for frame, value in zip(before.tolist(), kept.tolist(), strict=True):

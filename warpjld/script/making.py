@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Making", "Report", "cast", "exported_props", "prop_export_name"]
 
-_BLOCK = 16  # frames deformed per batch, so that memory does not grow with the length of the film
-
 Studio = FilmStudio | PressureStudio | PageStudio
 Report = Callable[[str, int, int], None]
 """Progress callback: name of the stage, steps done, steps in total."""
@@ -190,20 +188,15 @@ def _make_sequences(
             for prop in crowd.props
         ]
         studios = [stack.enter_context(studio_of(film)) for film in films]
-        blocks = [
-            role.covering.blocks(role.poses, frames=_BLOCK, device=crowd.device, threads=threads)
-            for role in crowd.roles
-        ]
         writers: list[Writer[Any]] = [*studios]
         writers += [writer for group in (*caches, *prop_caches) for writer in group]
-        for start, parts in _together(blocks, len(frames)):
+        for start, count, parts in _blocks(crowd, len(frames), threads):
             if not any(writer.works for writer in writers):
                 return
-            worn = [crowd.worn(role, v, start) for role, (_, v) in zip(crowd.roles, parts, strict=True)]
+            worn = [crowd.worn(role, v, start) for role, v in zip(crowd.roles, parts, strict=True)]
             for actor_caches, vertices in zip(caches, worn, strict=True):
                 for cache in actor_caches:
                     cache.do(partial(_write, vertices=vertices))
-            count = len(parts[0][1]) if parts else min(_BLOCK, len(frames) - start)
             for prop, places, object_caches in zip(crowd.props, crowd.places, prop_caches, strict=True):
                 if object_caches:
                     moved = np.stack([crowd.prop_vertices(prop, places, start + k) for k in range(count)])
@@ -211,19 +204,27 @@ def _make_sequences(
                     cache.do(partial(_write, vertices=moved.astype(np.float32)))
             for k in range(count):
                 progress("frames", start + k, len(frames))
-                together = np.concatenate([np.empty((0, 3), np.float32), *(vertices[k] for vertices in worn)])
+                if studios:
+                    together = np.concatenate([np.empty((0, 3), np.float32), *(vertices[k] for vertices in worn)])
                 for studio in studios:
                     studio.do(partial(_take, frame=start + k, vertices=together))
 
 
-def _together(
-    blocks: Sequence[Iterator[tuple[int, NDArray[np.float32]]]], count: int
-) -> Iterator[tuple[int, tuple[tuple[int, NDArray[np.float32]], ...]]]:
-    """Blocks of frames of all actors together, each with the index of its first frame; also where there is no actor."""
-    if not blocks:
-        yield from ((start, ()) for start in range(0, count, _BLOCK))
-    for parts in zip(*blocks, strict=True):
-        yield parts[0][0], parts
+def _blocks(
+    crowd: Crowd, count: int, threads: int | None
+) -> Iterator[tuple[int, int, tuple[NDArray[np.float32], ...]]]:
+    """Blocks of frames: index of the first, their number, and the vertices of every actor; also without actors."""
+    from warpjld.covering.blocks import FEW_FRAMES, frames_at_once
+
+    surfaces = [len(role.covering.surface.vertices) for role in crowd.roles]
+    many = frames_at_once(sum(surfaces) + sum(len(prop.thing.vertices) for prop in crowd.props))
+    if any(role.contact is not None for role in crowd.roles):
+        many = FEW_FRAMES
+    deformed = [
+        role.covering.blocks(role.poses, frames=many, device=crowd.device, threads=threads) for role in crowd.roles
+    ]
+    for start in range(0, count, many):
+        yield start, min(many, count - start), tuple(next(blocks)[1] for blocks in deformed)
 
 
 def _write(cache: Cache, vertices: NDArray[np.float32]) -> None:

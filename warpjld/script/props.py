@@ -89,7 +89,7 @@ class Prop:
     def key_frames(self) -> list[float]:
         """Frames that hold a key of this object."""
         tracks = [*self.placement.tracks.values(), *(self.barred.tracks.values() if self.barred else ())]
-        return sorted({key.frame for track in tracks for key in track.keys})
+        return sorted({frame for track in tracks for frame in track.frames})
 
 
 def prop_places(actors: Mapping[str, Actor], rate: float, prop: Prop, frames: NDArray[np.float64]) -> Places:

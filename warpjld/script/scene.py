@@ -91,7 +91,7 @@ class Actor:
     def key_frames(self) -> list[float]:
         """Frames that hold a key of this actor."""
         tracks = [*self.motion.tracks.values(), *self.placement.tracks.values()]
-        return sorted({key.frame for track in tracks for key in track.keys})
+        return sorted({frame for track in tracks for frame in track.frames})
 
     @property
     def span(self) -> tuple[float, float] | None:

@@ -21,7 +21,7 @@ def values(actor: Actor, frame: float, rate: float) -> str:
 
     lines = [f"{actor.name} at frame {frame:g}"]
     for channel, track in actor.motion.tracks.items():
-        at = "key" if any(key.frame == frame for key in track.keys) else "in-between"
+        at = "key" if frame in track.frames else "in-between"
         lines.append(f"  {channel:<36} {np.degrees(track.spline(frame)):>9.3f}°  {at}")
     for channel, track in actor.placement.tracks.items():
         moved = channel.startswith("move")

@@ -80,7 +80,7 @@ class Summary:
                     "joints": len(actor.skeleton),
                     "vertices": len(actor.rig.surface.vertices),
                     "faces": len(actor.rig.surface.faces),
-                    "keys": sum(len(track.keys) for track in actor.motion.tracks.values()),
+                    "keys": sum(len(track.frames) for track in actor.motion.tracks.values()),
                     "recorded": actor.recorded is not None,
                     "method": actor.method,
                     "domains": actor.domains,

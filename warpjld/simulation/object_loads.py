@@ -31,7 +31,7 @@ class ObjectLoad:
     def at(self, channel: str, frame: float) -> float:
         """Value of a channel at a frame [N or Pa]; 0 before its first key."""
         track = self.tracks.get(channel)
-        return 0.0 if track is None or frame < track.keys[0].frame else float(track.spline(frame))
+        return 0.0 if track is None or frame < track.frames[0] else float(track.spline(frame))
 
 
 @dataclass(eq=False)
@@ -50,4 +50,4 @@ class ObjectSpin:
 
     def at(self, frame: float) -> float:
         """Angular speed at a frame [rad/s]; 0 before its first key."""
-        return 0.0 if frame < self.track.keys[0].frame else float(self.track.spline(frame))
+        return 0.0 if frame < self.track.frames[0] else float(self.track.spline(frame))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -127,6 +128,36 @@ def test_names_a_place_that_cannot_be_written(surface: Surface, tmp_path: Path) 
 def test_needs_its_with_statement(surface: Surface, clip: np.ndarray, tmp_path: Path) -> None:
     with pytest.raises(WarpjldError, match="with statement"):
         open_cache(tmp_path / "a.npz", surface, frames=7, rate=25).write(clip)
+
+
+@every_format
+def test_two_processes_that_write_one_file_do_not_mix(
+    export: Callable[[str], Cache],
+    surface: Surface,
+    clip: np.ndarray,
+    tmp_path: Path,
+    suffix: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if suffix.startswith(".usd"):
+        pytest.importorskip("pxr")
+    want = {path.name: path.read_bytes() for path in export(f"a{suffix}").files}
+    how = {"frames": len(clip), "rate": 24.0, "start_frame": 3, "name": "hand"}
+    one, other = (open_cache(tmp_path / f"a{suffix}", surface, **how) for _ in range(2))
+    mine, parent = os.getpid(), os.getppid()
+    with one:
+        monkeypatch.setattr(os, "getpid", lambda: parent)  # a process that runs: its files are not swept
+        with other:
+            for start in (0, 4):
+                some = clip[start : start + 4]
+                monkeypatch.setattr(os, "getpid", lambda: mine)
+                one.write(some[:, :, ::-1])
+                monkeypatch.setattr(os, "getpid", lambda: parent)
+                other.write(some)
+        monkeypatch.setattr(os, "getpid", lambda: mine)
+        assert {path.name: path.read_bytes() for path in other.files} == want
+    assert sorted(want) == _files(tmp_path)
+    assert {path.name: path.read_bytes() for path in one.files} != want
 
 
 _FULL = """

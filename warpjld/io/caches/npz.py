@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import zipfile
-from typing import IO
-
 import numpy as np
-from numpy.lib import format as npy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from warpjld.files.array_archive import ArrayArchive
 from warpjld.io.caches.cache import Cache
 
 __all__ = ["NpzCache"]
@@ -28,47 +24,30 @@ class NpzCache(Cache):
 
     note = "vertices, faces, uv and rest are in the source's vertex order"
 
-    _archive: zipfile.ZipFile | None = None
-    _member: IO[bytes] | None = None
+    _archive: ArrayArchive | None = None
 
     def _begin(self) -> None:
-        self._archive = zipfile.ZipFile(self._part(self.path), "w", zipfile.ZIP_STORED, allowZip64=True)
-        constants: dict[str, ArrayLike] = {
-            "rest": self.rest,
-            "faces": self.surface.source_faces,
-            "weld": self.surface.weld,
-            "rate": np.float64(self.clip.rate),
-            "frames": self.clip.start + np.arange(self.clip.frames),
-        }
-        if self.surface.uv is not None:
-            constants["uv"] = np.asarray(self.surface.uv, np.float32)
-        if self.surface.corner_uv is not None:
-            constants["corner_uv"] = np.asarray(self.surface.corner_uv, np.float32)
-        for name, array in constants.items():
-            with self._archive.open(f"{name}.npy", "w") as member:
-                npy.write_array(member, np.asarray(array), allow_pickle=False)
-        self._member = self._archive.open("vertices.npy", "w", force_zip64=True)
-        shape = (self.clip.frames, len(self.surface.weld), 3)
-        npy.write_array_header_1_0(self._member, {"descr": "<f4", "fortran_order": False, "shape": shape})
+        surface, clip = self.surface, self.clip
+        self._archive = ArrayArchive(self._part(self.path))
+        self._archive.add("rest", self.rest)
+        self._archive.add("faces", surface.source_faces)
+        self._archive.add("weld", surface.weld)
+        self._archive.add("rate", np.float64(clip.rate))
+        self._archive.add("frames", clip.start + np.arange(clip.frames))
+        if surface.uv is not None:
+            self._archive.add("uv", np.asarray(surface.uv, np.float32))
+        if surface.corner_uv is not None:
+            self._archive.add("corner_uv", np.asarray(surface.corner_uv, np.float32))
+        self._archive.begin("vertices", (clip.frames, len(surface.weld), 3), "<f4")
 
     def _append(self, vertices: NDArray[np.float32]) -> None:
-        assert self._member is not None
-        self._member.write(vertices.data)
+        assert self._archive is not None
+        self._archive.extend(vertices)
 
     def _finish(self) -> None:
-        self._close()
+        assert self._archive is not None
+        self._archive.close()
 
     def _close(self) -> None:
-        member, archive, self._member, self._archive = self._member, self._archive, None, None
-        try:
-            if member is not None:
-                member.close()
-            if archive is not None:
-                archive.close()
-        except OSError:  # full disk: prevent another attempt to close, and another error, when it is deleted
-            if archive is not None:
-                file, archive.fp = archive.fp, None
-                if file is not None:
-                    with contextlib.suppress(OSError):
-                        file.close()
-            raise
+        if self._archive is not None:
+            self._archive.discard()

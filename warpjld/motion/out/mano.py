@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
+from warpjld.files.array_archive import ArrayArchive
+from warpjld.files.spilled_rows import SpilledRows
 from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.motion.hand_motion import IDENTITY
 from warpjld.motion.mano_rest import MANO_DIGITS, MANO_JOINTS, mano_rest
@@ -19,6 +20,9 @@ from warpjld.skeleton import Poses, Skeleton
 from warpjld.skeleton.streamed_poses import blocks_of
 
 __all__ = ["hand_parameters", "write_mano"]
+
+_FIELDS = {"global_orient": 3, "hand_pose": 45, "transl": 3}
+"""Field of a hand → count of numbers a frame."""
 
 
 def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMotion:
@@ -36,20 +40,26 @@ def write_mano(path: Path, rig: Rig, poses: Poses, timing: Timing) -> WrittenMot
     sides = [side for side in ("left", "right") if f"{side}.wrist" in rig.skeleton.names]
     if not sides:
         raise InputError("MANO parameters are those of a hand: this rig has none")
-    fields: dict[str, NDArray[Any]] = {
-        "joint_order": np.array(MANO_JOINTS),
-        "fps": np.array(float(timing.rate)),
-        "flat_hand_mean": np.array(True),
-        "frame": np.array("rig"),
-    }
-    if len(sides) == 1:
-        fields["side"] = np.array(sides[0])
-    for side in sides:
-        prefix = f"{side}_" if len(sides) > 1 else ""
-        blocks = [hand_parameters(rig.skeleton, some, side) for _, some in blocks_of(poses)]
-        fields |= {prefix + name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-    with path.open("wb") as file:
-        np.savez(file, allow_pickle=False, **fields)
+    # an archive holds one array after the other, so that what is computed together lies in a file in between
+    rows = {side: SpilledRows(sum(_FIELDS.values())) for side in sides}
+    for _, some in blocks_of(poses):
+        for side in sides:
+            fields = hand_parameters(rig.skeleton, some, side)
+            rows[side].extend(np.concatenate([fields[name] for name in _FIELDS], axis=1))
+    with ArrayArchive(path) as archive:
+        archive.add("joint_order", MANO_JOINTS)
+        archive.add("fps", float(timing.rate))
+        archive.add("flat_hand_mean", True)
+        archive.add("frame", "rig")
+        if len(sides) == 1:
+            archive.add("side", sides[0])
+        for side in sides:
+            first = 0
+            for name, width in _FIELDS.items():
+                archive.begin(f"{side}_{name}" if len(sides) > 1 else name, (len(poses), width), np.float64)
+                for block in rows[side].blocks():
+                    archive.extend(np.ascontiguousarray(block[:, first : first + width]))
+                first += width
     return WrittenMotion(("MANO's axis-angles from the flat hand; metacarpals, which MANO has not, in the fingers'",))
 
 

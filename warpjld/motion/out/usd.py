@@ -27,6 +27,7 @@ from warpjld.motion.out.baked_skin import BakedSkin
 from warpjld.motion.out.local_motion import local_motion, rest_scales
 from warpjld.motion.out.skin_weights import joint_weights
 from warpjld.motion.out.source_motion import SourceMotion, source_motion
+from warpjld.motion.out.usd_samples import JointSamples
 from warpjld.motion.out.write import Timing, WrittenMotion
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses
@@ -72,12 +73,15 @@ def write_usd(path: Path, rig: Rig, poses: Poses, timing: Timing, baked: BakedSk
     animation = UsdSkel.Animation.Define(stage, _below(stage, root, timing.name))
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     animation.CreateJointsAttr(skeleton.GetJointsAttr().Get())
-    binary = path.suffix.lower() != ".usda"
-    sheared = _animate(animation, motion, space, timing.start_frame, stage if binary else None)
+    text = JointSamples(len(space.order), timing.start_frame) if path.suffix.lower() == ".usda" else None
+    sheared = _animate(animation, motion, space, timing.start_frame, stage if text is None else text)
     mesh = _surface(stage, root, skeleton, rig, motion, space, baked, notes)
     if baked is not None and baked.names:
         _blend_shapes(stage, mesh, animation, rig, space, baked, timing.start_frame)
     save_layer(stage)
+    if text is not None:
+        del stage  # its layer is the file that is replaced
+        text.insert(path)
     bent = [motion.tree.names[j] for j in np.flatnonzero(sheared > _SHEARED)]
     warning = (
         f"{len(bent)} joints are below one scaled by different factors ({', '.join(bent[:4])}): USD cannot hold the "
@@ -202,7 +206,9 @@ def _tokens(names: list[str], parents: NDArray[np.int64]) -> list[str]:
     return out
 
 
-def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int, saved: Any | None) -> NDArray[np.float64]:
+def _animate(
+    animation: Any, motion: SourceMotion, space: _Space, start: int, into: Any | JointSamples
+) -> NDArray[np.float64]:
     """Write samples of all frames; returns the shear that is lost, as ``LocalMotion.sheared``.
 
     Args:
@@ -210,7 +216,8 @@ def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int, sa
         motion: The motion.
         space: Joints at rest.
         start: Time code of the first frame.
-        saved: Stage that is saved every few thousand frames, which frees their memory; None: not in between.
+        into: The stage, if it is binary: it is saved every few thousand frames, which frees their memory. Of a text
+            only the first frame is written to the stage, and all are left to be inserted.
     """
     from pxr import Vt
 
@@ -228,11 +235,15 @@ def _animate(animation: Any, motion: SourceMotion, space: _Space, start: int, sa
             # consecutive quaternions on the same hemisphere, for programs that interpolate components
             last = np.where((turn * last).sum(axis=-1, keepdims=True) < 0.0, -turn, turn)
             time = start + block.start + frame
+            if isinstance(into, JointSamples):
+                into.add(move, last)
+                if time > start:
+                    continue
             translations.Set(Vt.Vec3fArray.FromNumpy(move.astype(np.float32)), time)
             rotations.Set(Vt.QuatfArray.FromNumpy(last.astype(np.float32)), time)
         pending += len(local.translations) * len(given)
-        if saved is not None and pending > _PENDING:
-            save_layer(saved)
+        if pending > _PENDING and not isinstance(into, JointSamples):
+            save_layer(into)
             pending = 0
     return sheared
 

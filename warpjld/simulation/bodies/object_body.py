@@ -94,7 +94,7 @@ class ObjectBody(DeformableBody):
                 moved = self.place(time).apply(self.local[nodes])[0] - self.mesh.nodes[nodes]
             begun = held
             for axis, track in state.tracks.items():
-                begun = begun or frame >= track.keys[0].frame
+                begun = begun or frame >= track.frames[0]
                 moved[:, "xyz".index(axis)] += float(track.spline(frame))
             if begun:
                 degrees = (3 * nodes[:, None] + np.array(axes)).ravel()
