@@ -316,7 +316,7 @@ class GraspExperiment:
         return draw_grasp(hand_of(choice), self._thing(wanted, scale).body, trial, outcome, folder)
 
     def _thing(self, choice: ObjectChoice, scale: float) -> Thing:
-        return thing_of(choice, scale, self.settings.measuring.density, self.device)
+        return thing_of(choice, scale, self.settings.measuring.density)
 
     def _closer(self, hand: HandChoice, choice: ObjectChoice, scale: float) -> Closer:
         return closer_of(hand, choice, scale, self.settings.measuring.density)
