@@ -8,10 +8,10 @@ MOST_POINTS = 4096
 """Points of one hull: their numbers take 12 bits."""
 
 STRIDE = 8
-"""Numbers of a facet's plane: normal, distance from the origin, and the sign of the normal against its points' minors."""
+"""Numbers of a facet's plane: normal, distance from the origin, sign of the normal against the minors of its points."""
 
 _ACROSS = """
-    // normal of the hyperplane through six points: the minors of their differences, whose sign tells the order of points
+    // normal of the hyperplane through six points: the minors of their differences, with the sign of the points' order
     auto across = [](const double* points, const int* own, double* normal) {
         double m[5][6], x[6], size = 1.0;
         int column[6] = {0, 1, 2, 3, 4, 5};
@@ -133,7 +133,9 @@ _END = """
             for (int i = 0; i < 6; ++i) height += plane[STRIDE * f + i] * at[i];
             if (height > 0.0) {  // those to be removed come first
                 for (int i = 0; i < STRIDE; ++i) {
-                    const double t = plane[STRIDE * f + i]; plane[STRIDE * f + i] = plane[STRIDE * seen + i]; plane[STRIDE * seen + i] = t;
+                    const double t = plane[STRIDE * f + i];
+                    plane[STRIDE * f + i] = plane[STRIDE * seen + i];
+                    plane[STRIDE * seen + i] = t;
                 }
                 for (int k = 0; k < 6; ++k) {
                     const int t = corner[6 * f + k]; corner[6 * f + k] = corner[6 * seen + k]; corner[6 * seen + k] = t;

@@ -124,9 +124,7 @@ _EVERY_POINT = (
 )
 
 
-@wp.func_native(
-    _ROOM + growing_hull(_TOWARDS_ORIGIN, facets=MOST_FACETS, table=TABLE)
-)
+@wp.func_native(_ROOM + growing_hull(_TOWARDS_ORIGIN, facets=MOST_FACETS, table=TABLE))
 def facets_near_origin(
     points: wp.array(dtype=wp.float64),
     first: int,
