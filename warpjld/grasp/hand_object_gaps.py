@@ -69,8 +69,8 @@ class HandObjectGaps:
     def depth_of_object(self, vertices: NDArray[np.floating]) -> float:
         """Depth of the object's deepest point in a deformed skin (V, 3) [m], 0 where none is inside."""
         skins, gaps = self._skins.fitted(vertices[None], self.thing.place), np.zeros((1, len(self.parts)))
-        inside = {"near": _NEAR, "limit": np.inf, "outside": False}
-        self._skins.least_distances(skins, self.near.outline, self._owners[0], gaps, **inside)
+        points, owners = self.near.outline, self._owners[0]
+        self._skins.least_distances(skins, points, owners, gaps, near=_NEAR, limit=np.inf, outside=False)
         return -float(gaps.min())
 
     def _least(
