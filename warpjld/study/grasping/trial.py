@@ -46,7 +46,7 @@ class GraspExperiment:
 
     Attributes:
         settings: The plan.
-        device: Warp device of the covering and of distances to objects; hands close on the CPU.
+        device: Warp device of the covering of closed hands; all else is computed on the CPU.
     """
 
     settings: GraspPlan
