@@ -11,7 +11,7 @@ from warpjld_kernels.flexion_search import (
     OPENING,
     top_speed,
 )
-from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.lanes import VECTORISED, prelude
 from warpjld_kernels.signed_grid import SignedGrid, distance_bounds
 from warpjld_kernels.surface_distance import Hit, Solids, nearest
 
@@ -110,6 +110,27 @@ def march(
     return touch
 
 
+@wp.func_native(
+    prelude(8)
+    + """
+    const float* own = earliest.data + size_t(row) * earliest.shape[1];
+    Floats low = Floats(3e38f);
+    float least = best;
+    int n = 0;
+    for (; n + N <= count; n += N) low = LOWEST(low, *(const Stored*)(own + n));
+    for (; n < count; ++n) least = own[n] < least ? own[n] : least;
+    for (int l = 0; l < N; ++l) least = PICK(low, l) < least ? PICK(low, l) : least;
+    if (!(least < best)) return -1;
+    for (n = 0; n + N <= count; n += N)
+        if (const unsigned int found = LANES_OF(*(const Stored*)(own + n) == least)) return n + FIRST_OF(found);
+    for (; n < count; ++n) if (own[n] == least) return n;
+    return -1;
+"""
+)
+def soonest_of(earliest: wp.array2d(dtype=float), row: int, count: int, best: float) -> int:
+    """First of the smallest numbers of a row below ``best``; -1 if there is none."""
+
+
 @wp.kernel
 def first_touch(
     hands: Hands,
@@ -165,15 +186,11 @@ def first_touch(
             n += 1
     looking = winner < 0 and reach >= 1.0e-6
     while looking:
-        at = int(-1)
-        soonest = best
-        for n in range(count):
-            if earliest[r, n] < soonest:
-                soonest = earliest[r, n]
-                at = n
+        at = soonest_of(earliest, r, count, best)
         if at < 0:
             looking = False
         else:
+            soonest = earliest[r, at]
             v = vertex[first + at]
             chain = chain_at(hands.posture, hands.drives, r, soonest)
             two = distance_bounds(hands.solids, hands.grid, wp.vec3d(seen_from_object(hands, chain, r, v)))

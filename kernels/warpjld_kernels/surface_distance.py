@@ -153,7 +153,8 @@ def measure(
     # points
     points: wp.array2d(dtype=wp.vec3),
     limit: wp.float64,
-    # points first to end, in runs of so many
+    # order in which they are measured, or none; of these points first to end, in runs of so many
+    order: wp.array(dtype=wp.int32),
     first: int,
     end: int,
     run: int,
@@ -172,7 +173,10 @@ def measure(
     origin = position[row]
     last = wp.vec3d(wp.float64(0.0))
     known = bool(False)
-    for i in range(first + part * run, wp.min(first + (part + 1) * run, end)):
+    for k in range(first + part * run, wp.min(first + (part + 1) * run, end)):
+        i = k
+        if order.shape[0] > 0:
+            i = order[k]
         local = wp.quat_rotate_inv(turn, wp.vec3d(points[set_of[row], i]) - origin)
         within = limit
         if known:

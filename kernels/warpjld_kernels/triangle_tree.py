@@ -71,7 +71,8 @@ class Tree:
                     outside += gap * gap;
                 }}
                 if (!LANES_OF(outside * 0.999998f <= (float)best)) continue;
-                // distances in float32, for leaves that are near but hold nothing nearer
+                // distances in float32 leave few triangles that may be nearer
+                unsigned int near = 0;
                 {{
                     Floats corner[3][3], edge[3][3], normal[3], low = Floats(0.0f), side_of = Floats(3e38f);
                     Floats size = Floats(rounded);
@@ -107,47 +108,45 @@ class Tree:
                     low = side_of >= Floats(0.0f) ? LOWEST(low, to_plane) : low;
                     // narrower triangles than a part in 10⁵ of their size may count as their edges alone
                     const Floats most = (float)sqrt(best) * 1.00001f + {ROUNDING} * size;
-                    if (!LANES_OF(low <= most * most)) continue;
+                    near = LANES_OF(low <= most * most);
                 }}
-                Doubles corner[3][3], edge[3][3], normal[3], squared;
-                Doubles lateral = Doubles(1e300), lengths = Doubles(0.0);
-                for (int k = 0; k < 3; ++k)
-                    for (int i = 0; i < 3; ++i)
-                        corner[k][i] = WIDENED(*(const Stored*)(leaf + {WIDTH} * (3 * k + i) + base)) - point[i];
-                for (int k = 0; k < 3; ++k)
-                    for (int i = 0; i < 3; ++i) edge[k][i] = corner[(k + 1) % 3][i] - corner[k][i];
-                for (int i = 0; i < 3; ++i) {{
-                    const int j = (i + 1) % 3, m = (i + 2) % 3;
-                    normal[i] = edge[0][j] * edge[1][m] - edge[0][m] * edge[1][j];
-                }}
-                for (int k = 0; k < 3; ++k) {{
-                    const Doubles* a = corner[k];
-                    const Doubles* b = corner[(k + 1) % 3];
-                    const Doubles* e = edge[k];
-                    const Doubles length = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-                    Doubles t = -(a[0] * e[0] + a[1] * e[1] + a[2] * e[2]) / HIGHEST(length, Doubles(1e-300));
-                    t = LOWEST(HIGHEST(t, Doubles(0.0)), Doubles(1.0));
-                    const Doubles x = a[0] + t * e[0], y = a[1] + t * e[1], z = a[2] + t * e[2];
-                    const Doubles to_edge = x * x + y * y + z * z;
-                    squared = k ? LOWEST(squared, to_edge) : to_edge;
-                    // beyond an edge: on the other side of the plane through it and the normal
-                    const Doubles side = normal[0] * (a[1] * b[2] - a[2] * b[1])
-                        + normal[1] * (a[2] * b[0] - a[0] * b[2]) + normal[2] * (a[0] * b[1] - a[1] * b[0]);
-                    lateral = LOWEST(lateral, side);
-                    lengths += length;
-                }}
-                const Doubles wide = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
-                const Doubles height = corner[0][0] * normal[0] + corner[0][1] * normal[1] + corner[0][2] * normal[2];
-                const Doubles to_plane = height * height / HIGHEST(wide, Doubles(1e-300));
-                // a triangle without area has no inside, only a normal made of rounding
-                lateral = wide > {SLIVER} * lengths * lengths ? lateral : Doubles(-1.0);
-                squared = lateral >= Doubles(0.0) ? LOWEST(squared, to_plane) : squared;
-                double exact[N];
-                for (int l = 0; l < N; ++l) exact[l] = PICK(squared, l);
-                for (unsigned int near = LANES_OF(squared <= best); near; near &= near - 1) {{
-                    const int l = FIRST_OF(near), found = number[base + l];
-                    if (exact[l] < best || (exact[l] == best && found < nearest)) {{
-                        best = exact[l];
+                for (; near; near &= near - 1) {{
+                    const int l = base + FIRST_OF(near), found = number[l];
+                    double corner[3][3], edge[3][3], normal[3], squared = 0.0, lateral = 1e300, lengths = 0.0;
+                    for (int k = 0; k < 3; ++k)
+                        for (int i = 0; i < 3; ++i) corner[k][i] = (double)leaf[{WIDTH} * (3 * k + i) + l] - point[i];
+                    for (int k = 0; k < 3; ++k)
+                        for (int i = 0; i < 3; ++i) edge[k][i] = corner[(k + 1) % 3][i] - corner[k][i];
+                    for (int i = 0; i < 3; ++i) {{
+                        const int j = (i + 1) % 3, m = (i + 2) % 3;
+                        normal[i] = edge[0][j] * edge[1][m] - edge[0][m] * edge[1][j];
+                    }}
+                    for (int k = 0; k < 3; ++k) {{
+                        const double* a = corner[k];
+                        const double* b = corner[(k + 1) % 3];
+                        const double* e = edge[k];
+                        const double length = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+                        double t = -(a[0] * e[0] + a[1] * e[1] + a[2] * e[2]) / (length > 1e-300 ? length : 1e-300);
+                        t = t > 0.0 ? (t < 1.0 ? t : 1.0) : 0.0;
+                        const double x = a[0] + t * e[0], y = a[1] + t * e[1], z = a[2] + t * e[2];
+                        const double to_edge = x * x + y * y + z * z;
+                        squared = k && squared < to_edge ? squared : to_edge;
+                        // beyond an edge: on the other side of the plane through it and the normal
+                        const double side = normal[0] * (a[1] * b[2] - a[2] * b[1])
+                            + normal[1] * (a[2] * b[0] - a[0] * b[2]) + normal[2] * (a[0] * b[1] - a[1] * b[0]);
+                        lateral = side < lateral ? side : lateral;
+                        lengths += length;
+                    }}
+                    const double wide = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+                    // a triangle without area has no inside, only a normal made of rounding
+                    if (lateral >= 0.0 && wide > {SLIVER} * lengths * lengths) {{
+                        const double height =
+                            corner[0][0] * normal[0] + corner[0][1] * normal[1] + corner[0][2] * normal[2];
+                        const double to_plane = height * height / wide;
+                        squared = to_plane < squared ? to_plane : squared;
+                    }}
+                    if (squared < best || (squared == best && found < nearest)) {{
+                        best = squared;
                         nearest = found;
                     }}
                 }}

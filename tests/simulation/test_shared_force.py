@@ -101,6 +101,30 @@ def test_a_digit_that_does_not_reach_is_left_out() -> None:
     np.testing.assert_allclose(rest / 20.0, np.delete(STRENGTHS, 2) / np.delete(STRENGTHS, 2).sum(), rtol=0.08)
 
 
+def test_a_digit_that_slips_off_is_left_out_where_it_pressed_most() -> None:
+    """The last one passes the end of the handle: it presses a little, then less, then on nothing."""
+    others = pads(np.array([-3e-3, -1e-3, -2e-3, -4e-3, 1.0]))
+    tried: list[float] = []
+
+    def press(grips: Array) -> PressedDigits:
+        found, way = others(grips), float(grips[4])
+        tried.append(way)
+        force = max(0.0, 2.0 * (way / 0.1) * (1.0 - way / 0.2))  # at most 0.5 N, of 4.4 N that would be its share
+        slope = 2.0 / 0.1 * (1.0 - way / 0.1) if 0.0 <= way < 0.2 else 0.0
+        forces, shares, slopes = found.forces.copy(), found.shares.copy(), np.array(found.slopes)
+        forces[4], shares[4], slopes[4, 4] = force, force / STRENGTHS[4], slope / STRENGTHS[4]
+        return PressedDigits(forces, shares, slopes)
+
+    found = shared(press, 40.0)
+    assert found.status is ForceStatus.REACHED
+    assert found.left_out == (4,)
+    assert found.pressed is not None
+    assert found.pressed.forces.sum() == pytest.approx(40.0, rel=0.02)
+    assert found.pressed.forces[4] == max(2.0 * (way / 0.1) * (1.0 - way / 0.2) for way in tried)
+    assert found.grips[4] < 0.2  # of the 0.4 that it may close
+    assert len(found.trials) <= 12
+
+
 def test_a_digit_that_presses_on_its_neighbour_alone_is_left_out() -> None:
     """Its force hardly grows however far it bends."""
     good = pads(np.array([-3e-3, -1e-3, 1.0, -4e-3, -2e-3]))

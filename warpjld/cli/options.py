@@ -38,8 +38,8 @@ device_of_study: Decorator = click.option(
     "--device",
     default="cpu",
     show_default=True,
-    help="Where the skin of closed hands and first distances are computed: cpu, cuda:0, …; closing, contacts, force "
-    "closure and [contact] stay on the CPU.",
+    help="Where the skin of closed hands is computed: cpu, cuda:0, …; closing, distances, contacts, force closure and "
+    "[contact] stay on the CPU.",
 )
 device_of_script: Decorator = click.option(
     "--device",

@@ -15,6 +15,7 @@ from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.give_way import give_way
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.keep_apart import keep_apart
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.posed_skins import PosedSkins
 from warpjld.grasp.search_result import SearchStatus
@@ -63,13 +64,14 @@ class Closer:
     Args:
         covering: The hand, smooth method.
         thing: The object.
+        near: Search structures of the object, if there are some already, such as those of another hand's ``Closer``.
 
     Attributes:
         both: Distances between this hand and object.
     """
 
-    def __init__(self, covering: Covering, thing: GraspObject) -> None:
-        self.covering, self.thing, self.both = covering, thing, HandObjectGaps(covering, thing)
+    def __init__(self, covering: Covering, thing: GraspObject, near: NearObject | None = None) -> None:
+        self.covering, self.thing, self.both = covering, thing, HandObjectGaps(covering, thing, near)
         self._skin, self._posed = kept_with(covering, MovedSkin), kept_with(covering, PosedSkins)
 
     def close(

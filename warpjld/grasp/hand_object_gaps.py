@@ -11,8 +11,6 @@ from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.moving_skin import share_moved
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.grasp.outline_points import outline_points
-from warpjld.grasp.point_groups import grouped_points
 from warpjld.grasp.posed_skins import PosedSkins
 
 __all__ = ["HandObjectGaps"]
@@ -32,15 +30,16 @@ class HandObjectGaps:
     Args:
         covering: The hand.
         thing: The object.
+        near: Search structures of the object, if there are some already.
 
     Attributes:
         parts: Names of the parts, e.g. ``left.index``, ``left.palm``.
         part_of_vertex: Number of every vertex's part, shape (V,).
     """
 
-    def __init__(self, covering: Covering, thing: GraspObject) -> None:
-        self.covering, self.thing, self.near = covering, thing, NearObject(thing)
-        self._skins, self._points = kept_with(covering, PosedSkins), grouped_points(outline_points(thing))
+    def __init__(self, covering: Covering, thing: GraspObject, near: NearObject | None = None) -> None:
+        self.covering, self.thing, self.near = covering, thing, near or NearObject(thing)
+        self._skins = kept_with(covering, PosedSkins)
         self.parts = self._skins.parts.names
         owned = kept_with(covering, _Owners)
         self.part_of_vertex, self._owners, self._movers = owned.owners[1], owned.owners, owned.movers
@@ -70,7 +69,8 @@ class HandObjectGaps:
     def depth_of_object(self, vertices: NDArray[np.floating]) -> float:
         """Depth of the object's deepest point in a deformed skin (V, 3) [m], 0 where none is inside."""
         skins, gaps = self._skins.fitted(vertices[None], self.thing.place), np.zeros((1, len(self.parts)))
-        self._skins.least_distances(skins, self._points, self._owners[0], gaps, near=_NEAR, limit=np.inf, outside=False)
+        points, owners = self.near.outline, self._owners[0]
+        self._skins.least_distances(skins, points, owners, gaps, near=_NEAR, limit=np.inf, outside=False)
         return -float(gaps.min())
 
     def _least(
@@ -90,7 +90,7 @@ class HandObjectGaps:
             skins, found = self._skins.fitted(vertices[rows], where[rows]), gaps[rows]
             self.near.least_by_part(skins.points, self._all, of_vertex, found)
             self._skins.least_distances(
-                skins, self._points, of_face, found, near=_NEAR, limit=_DEEPEST, outside=most > 0.0
+                skins, self.near.outline, of_face, found, near=_NEAR, limit=_DEEPEST, outside=most > 0.0
             )
         return gaps
 

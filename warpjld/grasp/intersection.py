@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from warpjld.suggest import did_you_mean
 __all__ = ["Contact", "Intersection", "contacts", "intersection", "intersection_beside", "part_vertices"]
 
 _CELLS = 48  # cells of the volume's grid along the longest side of the overlap
+_BLOCK = 4  # points of the grid along a block's side
 _FINEST = 2e-4  # smallest edge of these cells [m]
 
 
@@ -182,7 +184,7 @@ def _common_volume(
     h = spacing or max(_FINEST, float((high - low).max()) / _CELLS)
     low, high = low - 2.0 * h, high + 2.0 * h
     axes = [np.arange(a + h / 2.0, b, h) for a, b in zip(low, high, strict=True)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)[_overlap(posed, skin, near, axes, h)]
     part = len(chosen) < len(local)  # the volume of a part: grid cells whose nearest triangle belongs to it
     # less of the grid lies in the skin than in the object, and a distance to the object takes longer
     to_skin, face = posed.distances(skin, points, np.inf if part else h)
@@ -194,6 +196,23 @@ def _common_volume(
         own = np.isin(covering.surface.faces, chosen).sum(axis=1) >= 2
         share = share * np.where(face < len(own), own[np.minimum(face, len(own) - 1)], False)
     return float(share.sum(dtype=np.float64) * h**3), h
+
+
+def _overlap(
+    posed: PosedSkins, skin: Any, near: NearObject, axes: list[NDArray[np.float64]], h: float
+) -> NDArray[np.bool_]:
+    """Mask of the points of a grid that may be within h of both a skin and an object, by blocks of points."""
+    firsts = [axis[::_BLOCK] for axis in axes]
+    middles = np.stack(np.meshgrid(*firsts, indexing="ij"), axis=-1) + (_BLOCK - 1) * h / 2.0
+    # no point of a block is farther from its middle, and signed distances of closed surfaces change by no more
+    limit = float(np.sqrt(3.0)) * (_BLOCK - 1) * h / 2.0 + 1.1 * h
+    kept = posed.distances(skin, middles.reshape(-1, 3), limit)[0] <= limit
+    if near.thing.report.solid:
+        kept[kept] = near.near(middles.reshape(-1, 3)[kept], limit).distance <= limit
+    blocks = kept.reshape(middles.shape[:-1])
+    for k, axis in enumerate(axes):
+        blocks = np.repeat(blocks, _BLOCK, axis=k).take(np.arange(len(axis)), axis=k)
+    return blocks
 
 
 def _without_side(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject
+from warpjld.grasp.outline_points import outline_points
+from warpjld.grasp.point_groups import grouped_points
 
 __all__ = ["NearObject", "NearPoints"]
 
@@ -49,7 +52,7 @@ class NearObject:
         from warpjld_kernels.signed_grid import UNKNOWN, SignedGrid
 
         self.thing, self.objects = thing, ObjectSet(thing.placed())
-        low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
+        low, high = self._box = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
         size = high - low
         step = max(_STEP, float((np.prod(size + 4.0 * _STEP) / _MOST) ** (1.0 / 3.0)))
         count = np.ceil(size / step).astype(int) + 2 * _AROUND + 1 if thing.report.solid else np.zeros(3, dtype=int)
@@ -61,6 +64,11 @@ class NearObject:
         grid.low, grid.count = wp.vec3d(*(low - _AROUND * step)), wp.vec3i(*count.tolist())
         grid.values = wp.full(int(count.prod()), float(UNKNOWN), dtype=wp.float64, device="cpu")
         self.grid: Any = grid
+
+    @cached_property
+    def outline(self) -> Any:
+        """Its vertices and points of its sharp edges (``outline_points``) for ``PosedSkins.least_distances``."""
+        return grouped_points(outline_points(self.thing))
 
     def least_by_part(
         self, points: Any, chosen: NDArray[np.int32], part_of: NDArray[np.int32], gaps: NDArray[np.float64]
@@ -98,6 +106,27 @@ class NearObject:
         gaps = np.full((len(skins), 1), np.inf)
         self.least_by_part(points, np.arange(count, dtype=np.int32), np.zeros(count, dtype=np.int32), gaps)
         return gaps[:, 0]
+
+    def met(self, points: NDArray[np.float64], direction: NDArray[np.float64], gap: float) -> NDArray[np.bool_]:
+        """Mask of points that may come within a gap of the object as they move, shape (n,).
+
+        The others pass the object's bounding box at a larger distance.
+
+        Args:
+            points: Points in world space [m], shape (n, 3); the object is at its own placement.
+            direction: Direction in which they move, shape (3,).
+            gap: The gap [m].
+        """
+        place = self.thing.place
+        start = place.to_local(points)[0]
+        along = place.to_local((place.position[0] + direction)[None])[0, 0]
+        entered, left = np.zeros(len(points)), np.full(len(points), np.inf)
+        for k, (low, high) in enumerate(zip(*self._box, strict=True)):
+            with np.errstate(divide="ignore", invalid="ignore"):  # of points that move along a side of the box
+                first, last = (low - gap - start[:, k]) / along[k], (high + gap - start[:, k]) / along[k]
+            entered = np.fmax(entered, np.fmin(first, last))
+            left = np.fmin(left, np.fmax(first, last))
+        return np.asarray(entered <= left)
 
     def at_least(self, points: NDArray[np.floating], beside: tuple[Any, Any]) -> NDArray[np.float32]:
         """Lower bounds, from the grid, of signed distances of all points on the edges at vertices [m], shape (G, V).

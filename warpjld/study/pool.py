@@ -17,7 +17,7 @@ from warpjld.tables.columns import checked_values
 
 __all__ = ["TrialWork", "perform", "performed", "run_trials"]
 
-_TOGETHER = 16  # largest number of similar trials in a block
+_TOGETHER = 32  # largest number of similar trials in a block
 _SHARES = 4  # smallest number of blocks per process
 
 

@@ -9,7 +9,9 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import Any, Literal
 
 from numpy.typing import NDArray
@@ -152,6 +154,8 @@ def _run_missing(
     note: Callable[[str], None],
 ) -> dict[str, Any]:
     """Run trials in processes or on a cluster; a description of these, for the manifest."""
+    # the summary is drawn afterwards, when the trials are waited for no more
+    Thread(target=import_module, args=("matplotlib.backends.backend_agg",), daemon=True).start()
     if ray is None:
         workers = min(processes or cores(), max(len(missing), 1))
         run_trials(experiment, missing, kept, processes=workers, done=done)

@@ -57,7 +57,7 @@ def _draw(
     left = 0.34 * len(rates) + 0.3 * len(statuses) + 2.0
     height = max(left, 1.5 * ((len(measured) + 1) // 2) + 1.0, 4.2)
     figure = Figure(figsize=(12.0, height), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    canvas = FigureCanvasAgg(figure)
     figure.suptitle(title, color=_INK, fontsize=14)
     halves: Any = figure.subfigures(1, 2)
     top, bottom = halves[0].subplots(2, 1, height_ratios=(len(rates) + 1.5, len(statuses) + 1.5))
@@ -72,7 +72,7 @@ def _draw(
     for label in figure.findobj(Text):
         label.set_parse_math(False)  # a title may contain $
     with whole_file(path) as part:
-        figure.savefig(part, metadata={"Software": None})
+        canvas.print_png(part, metadata={"Software": None})  # savefig would draw twice
 
 
 def _rate_bars(axis: Any, rates: Sequence[Rate]) -> None:

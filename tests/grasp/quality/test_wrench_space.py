@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from tests.grasp.quality.sets import four_on_box, least_on_sphere, ring_on_sphere, two_on_sphere
 from warpjld.errors import InputError
 from warpjld.grasp.quality import Contacts, contact_wrenches, least_resistance, wrench_space
-from warpjld.grasp.quality.nearest_facet import distances_to_boundary
+from warpjld.grasp.quality.nearest_facet import distances_to_boundary, hull_measures
 from warpjld.grasp.quality.wrench_space import least_resistances
 
 _ROUNDING = 1e-9  # qhull works in float64 on numbers around 1
@@ -205,11 +206,20 @@ def test_a_growing_hull_ends_with_the_same_epsilon(count: int, spin: float) -> N
         assert least_resistance(contacts, (0, 0, 0), torque_scale=0.03) == pytest.approx(whole, abs=1e-9)
 
 
+def by_qhull(contacts: Contacts, torque_scale: float) -> tuple[float, float]:
+    """Volume and epsilon of the hull of the origin and all primitive wrenches."""
+    wrenches = np.concatenate(contact_wrenches(contacts, (0, 0, 0), torque_scale), axis=1).T
+    hull = ConvexHull(np.concatenate([np.zeros((1, 6)), wrenches]))
+    return hull.volume, max(0.0, -hull.equations[:, -1].max())
+
+
 def test_a_growing_hull_of_regular_grasps() -> None:
     """Facets of more than six wrenches, which qhull merges."""
     for contacts in (four_on_box(0.04, 0.5), two_on_sphere(0.05, 0.5, 0.01), ring_on_sphere(0.05, 0.7)):
-        whole = wrench_space(contacts, (0, 0, 0), torque_scale=0.05).epsilon
-        assert least_resistance(contacts, (0, 0, 0), torque_scale=0.05) == pytest.approx(whole, abs=1e-9)
+        volume, epsilon = by_qhull(contacts, 0.05)
+        assert least_resistance(contacts, (0, 0, 0), torque_scale=0.05) == pytest.approx(epsilon, abs=1e-9)
+        whole = wrench_space(contacts, (0, 0, 0), torque_scale=0.05)
+        assert (whole.volume, whole.epsilon) == pytest.approx((volume, epsilon), rel=1e-8)
     assert (
         least_resistance(Contacts(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)), (0, 0, 0), torque_scale=1.0) == 0.0
     )
@@ -225,8 +235,16 @@ def test_the_growing_hull_finds_the_nearest_facet_of_the_whole_hull() -> None:
         grasps.append(Contacts(points, normals, rng.uniform(0.2, 1.0), rng.uniform(0.0, 0.004)))
     grasps += [two_on_sphere(0.03, 0.5, 0.01), ring_on_sphere(0.03, 0.4, 4), four_on_box(0.04, 0.6)]
     found = least_resistances(grasps, (0.0, 0.0, 0.0), torque_scale=0.05)
-    whole = [wrench_space(one, (0.0, 0.0, 0.0), torque_scale=0.05).epsilon for one in grasps]
-    np.testing.assert_allclose(found, whole, rtol=0.0, atol=_ROUNDING)
+    whole = np.array([by_qhull(one, 0.05) for one in grasps])
+    np.testing.assert_allclose(found, whole[:, 1], rtol=0.0, atol=_ROUNDING)
+    spaces = [wrench_space(one, (0.0, 0.0, 0.0), torque_scale=0.05) for one in grasps]
+    np.testing.assert_allclose([one.epsilon for one in spaces], whole[:, 1], rtol=0.0, atol=_ROUNDING)
+    # by the volume between the unperturbed points, though the facets are those of perturbed ones
+    np.testing.assert_allclose([one.volume for one in spaces], whole[:, 0], rtol=1e-8)
+    for one, space in zip(grasps, spaces, strict=True):
+        if space.epsilon:
+            heights = space.weakest @ np.concatenate(contact_wrenches(one, (0, 0, 0), 0.05), axis=1)
+            assert heights.max() == pytest.approx(space.epsilon, abs=_ROUNDING)
     assert 10 < np.count_nonzero(found) < len(grasps)
 
 
@@ -237,3 +255,12 @@ def test_points_on_one_facet_are_no_reason_for_doubt() -> None:
     outside = corners + np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # the origin on a facet
     distances = distances_to_boundary([np.concatenate([np.zeros((1, 6)), p]) for p in (corners, shifted, outside)])
     assert distances == pytest.approx([1.0, 0.6, 0.0], abs=1e-12)
+
+
+def test_the_whole_hull_of_a_cube() -> None:
+    """Of its 720 corner simplices or more none is in the perturbed hull for certain, but their volume is the cube's."""
+    corners = np.array(list(product((-1.0, 1.0), repeat=6))) + np.array([0.4, 0.0, 0.0, -0.2, 0.0, 0.0])
+    measured = hull_measures(np.concatenate([np.zeros((1, 6)), corners]))
+    assert measured is not None
+    assert measured[:2] == pytest.approx((64.0, 0.6), rel=1e-12)
+    assert measured[2] == pytest.approx([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=1e-12)

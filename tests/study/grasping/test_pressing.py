@@ -10,10 +10,14 @@ import pytest
 
 from warpjld.cli import main
 from warpjld.errors import InputError
+from warpjld.grasp.hand_object_gaps import HandObjectGaps
+from warpjld.skeleton import DIGITS, poses_from_angles
 from warpjld.study.grasping import GraspExperiment, load_plan
 from warpjld.study.grasping.grip_plots import GRIP_SHARES, finger_shares, write_grip_plots
-from warpjld.study.grasping.load import hand_of
+from warpjld.study.grasping.load import hand_of, opened_hand, thing_of
 from warpjld.study.grasping.plan import GraspPlan
+from warpjld.study.grasping.press_grasp import _without_share
+from warpjld.study.grasping.reach import digits_short_of
 from warpjld.study.pool import perform
 from warpjld.tables.files import read_table
 
@@ -113,6 +117,35 @@ def test_plots_of_grips(tmp_path: Path) -> None:
     assert [path.name for path in drawn] == ["grips.png", "pressure.png"]
     assert all(path.stat().st_size > 10_000 for path in drawn)
     assert write_grip_plots(tmp_path, plan, [row | {"press": "LIMIT"}], arrays) == []
+
+
+def test_digits_that_stay_short_of_the_handle(tmp_path: Path) -> None:
+    """The tip of the little finger lies in the handle; the index and middle fingers bend on beside it."""
+    plan = _plan(tmp_path)
+    choice, wanted, scale, _ = plan.combination(0)
+    hand, thing = hand_of(choice), thing_of(wanted, scale, plan.measuring.density)
+    skeleton = hand.rig.skeleton
+    angles, none = opened_hand(choice, "cylinder").angles, np.array([0.0, 0.0, 0.0, 1.0])
+    tip = poses_from_angles(skeleton, angles[None]).positions[0, skeleton.index("right.pinky.tip")]
+
+    def gaps(position: np.ndarray) -> dict[str, float]:
+        poses = poses_from_angles(skeleton, angles[None], root_position=position[None], root_rotation=none[None])
+        both = HandObjectGaps(hand.covering, thing.body)
+        (found,) = both.gaps(hand.covering.deform(poses))
+        return {name.rpartition(".")[2]: gap for name, gap in zip(both.parts, found, strict=True)}
+
+    beside = digits_short_of(hand, thing, angles, -tip, none, most=1e-9)
+    assert "pinky" not in beside
+    at_rest = gaps(-tip)
+    assert beside == pytest.approx({digit: at_rest[digit] for digit in beside}, abs=1e-6)
+    assert {"index", "middle"} <= set(beside)
+    bent = digits_short_of(hand, thing, angles, -tip, none, most=np.radians(20.0))
+    assert set(bent) <= set(beside)
+    assert all(0.0 < bent[digit] <= beside[digit] for digit in bent)
+    far = digits_short_of(hand, thing, angles, np.array([0.0, 1.0, 0.0]), none, most=0.1)
+    assert set(far) == set(DIGITS)
+    assert min(far.values()) > 0.7
+    assert _without_share({"pinky": 0.0023}, ("thumb", "pinky")) == "pinky 2.3 mm short, thumb touching"
 
 
 @pytest.mark.slow

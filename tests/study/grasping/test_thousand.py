@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -34,44 +35,79 @@ elevation = [-10, 60]
 """
 
 
-@pytest.mark.slow
-def test_a_thousand_trials_killed_half_way_give_the_same_bytes(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("pyarrow")
-    plan = tmp_path / "study.toml"
-    plan.write_text(_PLAN)
-    whole, cut = tmp_path / "whole", tmp_path / "cut"
-    assert _started(plan, whole, processes=2).wait() == 0
+    path = tmp_path_factory.mktemp("plan") / "study.toml"
+    path.write_text(_PLAN)
+    return path
 
-    study = _started(plan, cut, processes=3)
-    while _finished(cut) < _TRIALS // 2:
-        assert study.poll() is None, "the study ended before it could be killed"
-        time.sleep(0.02)
-    os.killpg(study.pid, signal.SIGKILL)  # its workers with it, whatever they are writing
-    study.wait()
-    stopped = _finished(cut)
-    assert _TRIALS // 2 <= stopped < _TRIALS
-    assert not (cut / "table.parquet").exists()
 
-    assert _started(plan, cut, processes=2).wait() == 0
-    for name in _RESULTS:
-        assert (cut / name).read_bytes() == (whole / name).read_bytes(), name
-    rows = read_table(cut / "table.parquet")
+@pytest.fixture(scope="module")
+def whole(plan: Path) -> Path:
+    """All trials in one process that nothing disturbs."""
+    assert _started(plan, plan.parent / "whole", processes=1).wait() == 0
+    return plan.parent / "whole"
+
+
+@pytest.mark.slow
+def test_a_thousand_trials_in_two_processes(plan: Path, whole: Path, tmp_path: Path) -> None:
+    assert _started(plan, tmp_path, processes=2).wait() == 0
+    _check_same(tmp_path, whole)
+    rows = read_table(whole / "table.parquet")
     assert [row["trial"] for row in rows] == list(range(_TRIALS))
     assert all(row["status"] != "error" for row in rows)
     assert sum(row["status"] == "closed" for row in rows) > 0.9 * _TRIALS
 
 
 @pytest.mark.slow
-def test_a_thousand_trials_on_ray_give_the_same_bytes(tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
+def test_a_thousand_trials_killed_half_way(plan: Path, whole: Path, tmp_path: Path) -> None:
+    study = _started(plan, tmp_path, processes=3)
+    while _finished(tmp_path) < _TRIALS // 2:
+        assert study.poll() is None, "the study ended before it could be killed"
+        time.sleep(0.02)
+    os.killpg(study.pid, signal.SIGKILL)  # its workers with it, whatever they are writing
+    study.wait()
+    assert _TRIALS // 2 <= _finished(tmp_path) < _TRIALS
+    assert not (tmp_path / "table.parquet").exists()
+    assert _started(plan, tmp_path, processes=2).wait() == 0
+    _check_same(tmp_path, whole)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("killed", [False, True])
+def test_a_thousand_trials_on_ray(plan: Path, whole: Path, tmp_path: Path, killed: bool) -> None:
     pytest.importorskip("ray")
-    plan = tmp_path / "study.toml"
-    plan.write_text(_PLAN)
-    here, there = tmp_path / "here", tmp_path / "there"
-    assert _started(plan, here, processes=1).wait() == 0
-    assert _started(plan, there, 2, "--ray", "local").wait() == 0
+    study = _started(plan, tmp_path, 2, "--ray", "local")
+    if killed:
+        while _finished(tmp_path) < _TRIALS // 4:
+            assert study.poll() is None, "the study ended before a worker could be killed"
+            time.sleep(0.02)
+        workers = [pid for pid, name in _descendants(study.pid) if name.startswith("ray::trial_bytes")]
+        os.kill(workers[0], signal.SIGKILL)
+    assert study.wait() == 0
+    _check_same(tmp_path, whole)
+
+
+def _check_same(one: Path, other: Path) -> None:
     for name in _RESULTS:
-        assert (here / name).read_bytes() == (there / name).read_bytes(), name
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+def _descendants(root: int) -> list[tuple[int, str]]:
+    """Processes below one, and their command lines."""
+    parents: dict[int, tuple[int, str]] = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # it has ended
+            parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+            parents[int(folder.name)] = parent, (folder / "cmdline").read_text()
+    found = []
+    for pid, (parent, name) in parents.items():
+        while parent in parents and parent != root:
+            parent = parents[parent][0]
+        if parent == root:
+            found.append((pid, name))
+    return found
 
 
 def _started(plan: Path, out: Path, processes: int, *more: str) -> subprocess.Popen[bytes]:

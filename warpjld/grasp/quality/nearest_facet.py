@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["distances_to_boundary"]
+__all__ = ["distances_to_boundary", "hull_measures"]
 
 Array = NDArray[np.float64]
 
@@ -29,42 +29,76 @@ def distances_to_boundary(hulls: Sequence[Array]) -> list[float | None]:
     Args:
         hulls: Sets of points, each of which contains the origin.
     """
-    import warp as wp
-    from warpjld_kernels import wrench_hull
-
     if not hulls:
         return []
-    counts = [len(points) for points in hulls]
-    if max(counts) > wrench_hull.MOST_POINTS:
-        return [None] * len(hulls)
-    sizes = np.array([max(float(np.abs(points).max()), 1e-300) for points in hulls])
+    found, _ = _near_facets(hulls, whole=False)
+    nearest = [_exact(own, normals) for own, normals in zip(hulls, found, strict=True)]
+    return [None if one is None else one[0] for one in nearest]
+
+
+def hull_measures(points: Array) -> tuple[float, float, Array] | None:
+    """Volume of the convex hull of points (k, 6), distance from the origin to its boundary and normal there (6,).
+
+    None where in doubt, as for ``distances_to_boundary``, or if the hull has too many facets for the kernel.
+
+    Args:
+        points: The points, among them the origin.
+    """
+    (normals,), (volume,) = _near_facets([points], whole=True)
+    nearest = _exact(points, normals)
+    return None if nearest is None else (float(volume), *nearest)
+
+
+def _near_facets(hulls: Sequence[Array], *, whole: bool) -> tuple[list[Array], Array]:
+    """Normals (n, 6) of the perturbed facets nearest to the origin, n = 0 where in doubt; volumes of whole hulls."""
+    import warp as wp
+    from warpjld_kernels import growing_hull, wrench_hull
+
+    counts, rows = [len(points) for points in hulls], len(hulls)
+    volumes, nothing = np.zeros(rows), [np.zeros((0, 6)) for _ in hulls]
+    if max(counts) > growing_hull.MOST_POINTS:
+        return nothing, volumes
+    facets, table = wrench_hull.MOST_FACETS, wrench_hull.TABLE
+    if whole:
+        facets, table = wrench_hull.MOST_OF_WHOLE, wrench_hull.TABLE_OF_WHOLE
+    sizes = np.array([_size(points) for points in hulls])
     shaken = np.random.default_rng(0).uniform(-_SHAKE, _SHAKE, (max(counts), 6))
     points = np.concatenate([own + size * shaken[: len(own)] for own, size in zip(hulls, sizes, strict=True)])
-    rows, facets = len(hulls), wrench_hull.MOST_FACETS
     normals, found = np.zeros((rows, 6 * wrench_hull.NEAREST)), np.zeros(rows, dtype=np.int32)
+    exact = [(np.concatenate(hulls).reshape(-1), wp.float64)] if whole else []
     arrays = (
         (points.reshape(-1), wp.float64),
+        *exact,
         (np.cumsum([0, *counts]).astype(np.int32), wp.int32),
         (_BEYOND * sizes, wp.float64),
         (_SLACK * sizes, wp.float64),
-        (np.empty((rows, 7 * facets)), wp.float64),
+        (np.empty((rows, growing_hull.STRIDE * facets)), wp.float64),
         (np.empty((rows, 6 * max(counts))), wp.float64),
         (np.empty((rows, 6 * facets), dtype=np.int32), wp.int32),
-        (np.empty((rows, wrench_hull.TABLE), dtype=np.uint64), wp.uint64),
+        (np.empty((rows, table), dtype=np.uint64), wp.uint64),
         (normals, wp.float64),
         (found, wp.int32),
+        *([(volumes, wp.float64)] if whole else []),
     )
     given = [wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in arrays]
-    wp.launch(wrench_hull.nearest_facets, rows, inputs=given[:8], outputs=given[8:], device="cpu")
+    kernel = wrench_hull.whole_hulls if whole else wrench_hull.nearest_facets
+    wp.launch(kernel, rows, inputs=given, device="cpu")
     near = normals.reshape(rows, wrench_hull.NEAREST, 6)
-    return [
-        _exact(own, float(size), near[k, : found[k]]) for k, (own, size) in enumerate(zip(hulls, sizes, strict=True))
-    ]
+    return [near[k, : max(found[k], 0)] for k in range(rows)], volumes
 
 
-def _exact(points: Array, size: float, normals: Array) -> float | None:
-    """Smallest distance of the planes of facets with nearly these normals (n, 6); None where none defines a plane."""
-    least: float | None = None
+def _size(points: Array) -> float:
+    """Largest coordinate of points."""
+    return max(float(np.abs(points).max()), 1e-300)
+
+
+def _exact(points: Array, normals: Array) -> tuple[float, Array] | None:
+    """Smallest distance of the planes of facets with nearly these normals (n, 6), and that plane's normal (6,).
+
+    None where none defines a plane.
+    """
+    size = _size(points)
+    least: tuple[float, Array] | None = None
     for normal in normals:
         heights = points @ normal
         on = points[heights >= heights.max() - _ON * size]
@@ -80,7 +114,7 @@ def _exact(points: Array, size: float, normals: Array) -> float | None:
                 return None
             continue
         if away <= _FLAT * size:  # the origin is a point of the hull, and here on its boundary
-            return 0.0
+            return 0.0, plane
         if wide == 5:  # else a face of fewer dimensions, which facets as near or nearer contain
-            least = away if least is None else min(least, away)
+            least = (away, plane) if least is None or away < least[0] else least
     return least

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
 from warpjld.grasp.quality.contacts import Contacts
-from warpjld.grasp.quality.nearest_facet import distances_to_boundary
+from warpjld.grasp.quality.nearest_facet import distances_to_boundary, hull_measures
 from warpjld.grasp.quality.wrenches import contact_wrenches, has_full_rank
 
 if TYPE_CHECKING:
@@ -87,13 +87,10 @@ def wrench_space(
         return nothing
     points = _union(blocks) if norm == "L1" else _minkowski_sum(blocks)
 
-    hull = _hull(points)
-    nearest = int(hull.equations[:, -1].argmax())  # facets are n·w + b ≤ 0: the origin lies −b inside
-    epsilon = -float(hull.equations[nearest, -1])
-    volume = float(hull.volume)
+    volume, epsilon, weakest = hull_measures(points) or _by_qhull(points)
     if epsilon <= 10.0 * _SHAKE:  # the origin, always a point of the set, is on its boundary
         return WrenchSpace(0.0, volume, np.zeros(6), norm, torque_scale, edges)
-    return WrenchSpace(epsilon, volume, hull.equations[nearest, :-1].copy(), norm, torque_scale, edges)
+    return WrenchSpace(epsilon, volume, weakest, norm, torque_scale, edges)
 
 
 def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: float, edges: int = 8) -> float:
@@ -120,6 +117,13 @@ def least_resistances(
         epsilon = _by_growing_hull(own) if found is None else found
         out[k] = epsilon if epsilon > 10.0 * _SHAKE else 0.0
     return out
+
+
+def _by_qhull(points: Array) -> tuple[float, float, Array]:
+    """Volume of the hull of points (k, 6), distance from the origin to its boundary and normal there (6,)."""
+    hull = _hull(points)
+    nearest = int(hull.equations[:, -1].argmax())  # facets are n·w + b ≤ 0: the origin lies −b inside
+    return float(hull.volume), -float(hull.equations[nearest, -1]), hull.equations[nearest, :-1].copy()
 
 
 def _by_growing_hull(points: Array) -> float:

@@ -75,7 +75,9 @@ def find_shared(
     force = 0.0 if found.pressed is None else float(found.pressed.forces.sum())
     text, grip = _text(request.force, list(joints), found), float(found.grips.max())
     edits = edits if found.grips.any() else ()
-    return FoundGrip(request, found.status.name, text, grip, None, force, digits_that_press(effort), tuple(rows), edits)
+    each = digits_that_press(effort)
+    left = tuple(list(joints)[k].rpartition(".")[2] for k in found.left_out)
+    return FoundGrip(request, found.status.name, text, grip, None, force, each, tuple(rows), edits, left_out=left)
 
 
 def _sharing(hand: FleshBody, request: GripSpecification) -> list[str]:
@@ -104,5 +106,5 @@ def _text(force: float, digits: Sequence[str], found: SharedGrip) -> str:
     out += ", ".join(f"{name} {f:.3g} N ({s:.1%} of its muscles, {math.degrees(g):+.2f}°)" for name, f, s, g in each)
     if found.left_out:
         short = ", ".join(names[k] for k in found.left_out)
-        out += f"; without their share, bent as far as they may: {short}"
+        out += f"; without their share, as far as they may bend: {short}"
     return out

@@ -67,6 +67,7 @@ class FoundGrip:
         rows: One row for every grip tried, or for every digit of it where digits share.
         edits: Angles of the closing digits.
         release: Release of the object's support; None if it is not released.
+        left_out: Digits that press with less than their share of the muscles, as far as they may bend on.
     """
 
     request: GripSpecification
@@ -79,6 +80,7 @@ class FoundGrip:
     rows: tuple[dict[str, Any], ...] = ()
     edits: tuple[AngleEdit, ...] = ()
     release: SupportRelease | None = None
+    left_out: tuple[str, ...] = ()
 
     @property
     def interrupted(self) -> bool:

@@ -42,6 +42,12 @@ _FARTHEST = 4.0
 presses on gives way, as a neighbour does."""
 _TOTAL = 30.0
 """Weight of the total force in least squares, beside each digit's share: nearly a constraint."""
+_GRAZES = 0.1
+"""Share relative to the wanted one from which a digit presses on the object, not on a neighbour alone."""
+_SLIPS = 0.5
+"""The same below which a digit that presses less as it closes on slips off the object."""
+_STILL = 0.2
+"""Largest closing of all others, relative to that digit's own, that does not explain it."""
 _SINGULAR = 1e4
 """Condition number above which the digits cannot press apart from one another."""
 SAME_CLOSING = 1e-9
@@ -72,7 +78,7 @@ class SharedGrip:
         status: How the search ended.
         grips: Closing of each digit, shape (D,).
         pressed: Forces there; None if nothing was solved.
-        left_out: Digits that press on nothing, or less than their share, as far as they may bend.
+        left_out: Digits that press on nothing, or less than their share, as far as they may bend, or that slip off.
         trials: Every trial, in order.
     """
 
@@ -146,6 +152,7 @@ class _Search:
         self.trials: list[tuple[Array, PressedDigits]] = []
         self._reach, self._most = np.full(len(low), start), np.full(len(low), _FARTHEST * start)
         self._best, self._idle = np.inf, 0
+        self._slipped = np.zeros(len(low), dtype=bool)
 
     def pressing(self, found: PressedDigits) -> NDArray[np.bool_]:
         """Which digits press."""
@@ -153,9 +160,9 @@ class _Search:
 
     def wanted(self, grips: Array, found: PressedDigits) -> tuple[float, NDArray[np.bool_]]:
         """Wanted share, and which digits can have it: all but those that have less as far as they may bend, or more
-        as far as they may open."""
+        as far as they may open, or that slip off."""
         pressing = self.pressing(found)
-        able = np.ones(len(grips), dtype=bool)
+        able = ~self._slipped
         at = np.where(pressing, found.forces / np.where(pressing, found.shares, 1.0), self.strengths)
         share = 0.0
         for _ in range(len(grips) + 1):  # terminates: every round takes out a digit
@@ -181,6 +188,7 @@ class _Search:
     def status(self, tolerance: float, even: float) -> ForceStatus | None:
         """Status with which the last trial ends the search; None to continue."""
         grips, found = self.trials[-1]
+        self._note_slips()
         _, able = self.wanted(grips, found)
         total = float(found.forces.sum())
         if self.sums_up(found, tolerance):
@@ -199,11 +207,25 @@ class _Search:
             return ForceStatus.TOO_WEAK
         return None
 
+    def _note_slips(self) -> None:
+        """Find digits that press less than before because they closed on: past the end of the object, or round it."""
+        if len(self.trials) < 2:
+            return
+        (before, pressed), (grips, found) = self.trials[-2:]
+        share, able = self.wanted(grips, found)
+        moved = grips - before
+        for d in np.flatnonzero(able & (moved >= self.start) & (found.shares < pressed.shares)).tolist():
+            alone = np.abs(np.delete(moved, d)).max(initial=0.0) <= _STILL * moved[d]
+            most = max(float(known.shares[d]) for _, known in self.trials)
+            self._slipped[d] = alone and _GRAZES * share <= most <= _SLIPS * share
+
     def next(self) -> Array:
         """Closings of the next trial."""
         grips, found = self.trials[-1]
         share, able = self.wanted(grips, found)
         step = np.zeros(len(grips))
+        for d in np.flatnonzero(self._slipped).tolist():  # back to where it pressed most
+            step[d] = max(self.trials, key=lambda one: float(one[1].shares[d]))[0][d] - grips[d]
         pressing = able & self.pressing(found)
         for d in np.flatnonzero(able & ~pressing).tolist():
             step[d] = self._toward(d)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -13,8 +13,9 @@ from warpjld.covering import Covering
 from warpjld.covering.device import checked_device
 from warpjld.covering.kept import bind_kept
 from warpjld.errors import InputError
-from warpjld.grasp import GraspObject, ObjectSet
+from warpjld.grasp import GraspObject
 from warpjld.grasp.close import Closer
+from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.palm import Palm, palm_of
 from warpjld.grasp.postures import posture_angles
 from warpjld.grasp.segments import vertex_segments
@@ -68,19 +69,19 @@ class Thing:
     """An object ready for trials, at its scale.
 
     Attributes:
-        objects: Search structures of this one object.
+        body: The object.
         mass: Its mass [kg].
         radius: Largest distance of its surface from its centre of mass [m].
     """
 
-    objects: ObjectSet
+    body: GraspObject
     mass: float
     radius: float
 
-    @property
-    def body(self) -> GraspObject:
-        """The object."""
-        return self.objects.objects[0]
+    @cached_property
+    def near(self) -> NearObject:
+        """Its search structures, for all hands."""
+        return NearObject(self.body)
 
 
 def device_identity(device: str) -> dict[str, str]:
@@ -142,8 +143,8 @@ def _angles(skeleton: Skeleton, posture: tuple[tuple[str, str, float], ...], nam
 
 
 @lru_cache(maxsize=32)
-def thing_of(choice: ObjectChoice, scale: float, density: float, device: str = "cpu") -> Thing:
-    """Build or read an object at a scale, for distances on a Warp device; cached for the process.
+def thing_of(choice: ObjectChoice, scale: float, density: float) -> Thing:
+    """Build or read an object at a scale; cached for the process.
 
     Raises:
         InputError: It cannot be used, or has neither volume nor mass.
@@ -154,7 +155,7 @@ def thing_of(choice: ObjectChoice, scale: float, density: float, device: str = "
     if not mass > 0.0:
         raise InputError(f"object {choice.name}: encloses no volume; give it a mass")
     radius = float(np.linalg.norm(body.vertices - body.centroid, axis=1).max())
-    return Thing(ObjectSet(body, device=device), mass, radius)
+    return Thing(body, mass, radius)
 
 
 @lru_cache(maxsize=32)
@@ -164,4 +165,5 @@ def closer_of(choice: HandChoice, wanted: ObjectChoice, scale: float, density: f
     Raises:
         InputError: Hand or object cannot be used.
     """
-    return Closer(hand_of(choice).covering, thing_of(wanted, scale, density).body)
+    thing = thing_of(wanted, scale, density)
+    return Closer(hand_of(choice).covering, thing.body, thing.near)

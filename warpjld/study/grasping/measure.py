@@ -5,22 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
 from warpjld.grasp.quality import (
     SIX_DIRECTIONS,
-    ContactPatches,
     force_closure,
     gravity_displacement,
     penetration,
     self_penetration,
     wrench_space,
 )
-from warpjld.grasp.touching import touching_patches
 from warpjld.skeleton import DIGITS
 from warpjld.study.grasping.load import Hand, Thing
 from warpjld.study.grasping.plan import Measuring
+from warpjld.study.grasping.tried import TouchingSkin
 
 __all__ = ["measure_grasp"]
 
@@ -28,23 +26,23 @@ _DOWN = int((SIX_DIRECTIONS @ [0.0, -1.0, 0.0]).argmax())
 
 
 def measure_grasp(
-    hand: Hand, thing: Thing, both: HandObjectGaps, vertices: NDArray[np.float32], friction: float, how: Measuring
-) -> tuple[dict[str, Any], ContactPatches]:
+    hand: Hand, thing: Thing, both: HandObjectGaps, touching: TouchingSkin, friction: float, how: Measuring
+) -> dict[str, Any]:
     """Measure a grasp; `warpjld.grasp.quality` defines the metrics, one per file.
 
     Args:
         hand: The hand.
         thing: The object.
         both: Distances between the two.
-        vertices: The deformed skin in the object's frame [m], shape (V, 3).
+        touching: The hand's skin, with the contacts of ``how.contact``.
         friction: Coulomb coefficient.
         how: Settings.
 
     Returns:
-        Values by column, and the contact patches.
+        Values by column.
     """
     body, scale = thing.body, how.torque_scale or thing.radius
-    (patches,), (deepest,) = touching_patches(hand.finer, hand.parts, both.near, vertices[None], how.contact)
+    patches, vertices = touching.patches, touching.skin
     contacts, center = patches.contacts(friction), body.centroid
     closure = force_closure(contacts, center, torque_scale=scale, edges=how.edges)
     space = wrench_space(contacts, center, torque_scale=scale, norm=how.norm, edges=how.edges)
@@ -60,12 +58,12 @@ def measure_grasp(
         closure=closure,
     )
     inside = penetration(both, vertices)
-    skin_inside = max(inside.skin, float(deepest))
+    skin_inside = max(inside.skin, touching.deepest)
     areas = dict.fromkeys((*DIGITS, "palm"), 0.0)
     for digit, area in zip(patches.digits, patches.areas, strict=True):
         areas[digit if digit in DIGITS else "palm"] += float(area)
     firm = how.displacement is None or gravity.worst <= how.displacement
-    values = {
+    return {
         "contacts": len(patches),
         "digits": sum(areas[digit] > 0.0 for digit in DIGITS),
         "area": float(patches.areas.sum()),
@@ -88,4 +86,3 @@ def measure_grasp(
         "lift_least": float(gravity.lift.min()),
         "success": bool(closure.closed and max(skin_inside, inside.thing) <= how.penetration and firm),
     }
-    return values, patches

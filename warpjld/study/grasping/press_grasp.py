@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ from warpjld.simulation.specification import (
 from warpjld.skeleton import DIGITS
 from warpjld.study.grasping.load import Hand, Thing
 from warpjld.study.grasping.pressing import ContactPlan
+from warpjld.study.grasping.reach import digits_short_of
 
 __all__ = ["press_grasp"]
 
@@ -66,6 +68,10 @@ def press_grasp(
         solution; and a message, which may be empty.
     """
     asked = how.force(weight, friction)
+    short = digits_short_of(hand, thing, angles, position, rotation, most=float(np.radians(how.most)))
+    values: dict[str, Any] = {"asked_force": asked, "success": False, "without_share": _without_share(short, ())}
+    if len(short) == len(DIGITS):
+        return values | {"press": ForceStatus.NO_CONTACT.name}, None, ForceStatus.NO_CONTACT.value
     closing = np.array(_CLOSING)[:, None, None] * (angles - start) + start
     # recorded angles have no rotation of the root: the hand stays at rest, the object gets the inverse placement
     back, root = Rotation.from_quat(rotation).inv(), hand.rig.skeleton.rest[0]
@@ -75,16 +81,16 @@ def press_grasp(
         [RecordedObject(_OBJECT, thing.body, **place)],
     )
     try:
-        found = simulate(_specification(hand, asked, friction, how), animation)
+        found = simulate(_specification(hand, asked, friction, how, short), animation)
     except WarpjldError as error:
-        return {"press": ForceStatus.NO_SOLUTION.name, "asked_force": asked, "success": False}, None, str(error)
-    values: dict[str, Any] = {"press": _ending(found), "asked_force": asked, "success": False}
+        return values | {"press": ForceStatus.NO_SOLUTION.name}, None, str(error)
+    values["press"] = _ending(found)
     if not found.grips or not len(found.frames) or found.frames[-1] <= _CLOSED:
         return values, None, found.verdict.text
     last = float(found.frames[-1])
     rows = [row for row in found.rows if row.frame == last and row.actor == _HAND]
     pressure = found.visible_pressure(_HAND, last).pressure[: hand.rig.surface.vertices.shape[0]]
-    values |= _measured(found, rows)
+    values |= _measured(found, rows) | {"without_share": _without_share(short, found.grips[0].left_out)}
     reached = values["press"] == ForceStatus.REACHED.name
     values["success"] = reached and how.kept(values["force"], asked=asked)
     message = found.grips[0].text if not values["success"] else ""
@@ -93,10 +99,14 @@ def press_grasp(
     return values, np.asarray(pressure), message
 
 
-def _specification(hand: Hand, asked: float, friction: float, how: ContactPlan) -> ContactSpecification:
-    channels = tuple(f"{hand.side}.{digit}.{knuckle}.flexion" for digit in DIGITS for knuckle in _KNUCKLES)
+def _specification(
+    hand: Hand, asked: float, friction: float, how: ContactPlan, short: Mapping[str, float]
+) -> ContactSpecification:
+    """Specification of the solve; where muscles share, digits that do not reach the object stay as they are."""
     most = float(np.radians(how.most))
     share: Literal["muscles"] | None = "muscles" if how.share == "muscles" else None
+    closing = [digit for digit in DIGITS if share is None or digit not in short]
+    channels = tuple(f"{hand.side}.{digit}.{knuckle}.flexion" for digit in closing for knuckle in _KNUCKLES)
     grip = GripSpecification(_HAND, _OBJECT, _CLOSED, _CLOSED + 1, channels, most=most, force=asked, share=share)
     return ContactSpecification(
         flesh={_HAND: FleshMaterial(element=how.element, itself=False)},
@@ -109,6 +119,12 @@ def _specification(hand: Hand, asked: float, friction: float, how: ContactPlan) 
 def _ending(found: Simulation) -> str:
     """Final status: that of the grip if the solver converged, else that of the solver."""
     return found.grips[0].status if found.grips and found.verdict.status == "CONVERGED" else found.verdict.status
+
+
+def _without_share(short: Mapping[str, float], left_out: Sequence[str]) -> str:
+    """Digits that press with less than their share, and by how much they fail to reach the object."""
+    named = [f"{digit} {1e3 * short[digit]:.1f} mm short" for digit in DIGITS if digit in short]
+    return ", ".join([*named, *(f"{digit} touching" for digit in left_out if digit not in short)])
 
 
 def _measured(found: Simulation, rows: list[ContactRow]) -> dict[str, Any]:

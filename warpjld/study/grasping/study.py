@@ -21,7 +21,7 @@ class Study:
 
     Attributes:
         plan: The plan.
-        device: Warp device of the covering and of distances to objects; hands close on the CPU.
+        device: Warp device of the covering of closed hands; all else is computed on the CPU.
 
     Examples:
         >>> from tempfile import mkdtemp

@@ -26,6 +26,7 @@ from warpjld.study.grasping.columns import GRASP_COLUMNS, PRESSED_COLUMNS
 from warpjld.study.grasping.load import Hand, Thing, closer_of, device_identity, hand_of, opened_hand, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import GraspPlan
+from warpjld.study.grasping.tried import OpenHand, PosedHand, TriedHand, posed_hands
 from warpjld.study.grasping.variety import varieties
 from warpjld.study.grasping.wrist import backed_off, draw_approach, place_palm
 from warpjld.tables.columns import Column
@@ -39,40 +40,18 @@ _SHOWN = ("penetration", "epsilon", "area", "volume", "displacement", "overlap")
 _SHOWN_PRESSED = ("force", "normal_force", "pressed_area", "peak_pressure", "muscle_share", "epsilon")
 
 
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """A closed hand: open and closed angles (J, 4), placement of its root, whether it touches, values by column."""
-
-    start: Array
-    angles: Array
-    position: Array
-    rotation: Array
-    touches: bool
-    values: dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class _Open:
-    """A placed open hand: angles (J, 4), displacement and rotation of its root, values by column."""
-
-    angles: Array
-    position: Array
-    rotation: Array
-    values: dict[str, Any]
-
-
 @dataclass(frozen=True)
 class GraspExperiment:
     """Experiment of a grasp plan, for `warpjld.study.run_study`.
 
     Attributes:
         settings: The plan.
-        device: Warp device of the covering and of distances to objects; hands close on the CPU.
+        device: Warp device of the covering of closed hands; all else is computed on the CPU.
     """
 
     settings: GraspPlan
     device: str = "cpu"
-    _ahead: dict[int, _Tried | Outcome] = field(default_factory=dict, compare=False, repr=False)
+    _ahead: dict[int, tuple[TriedHand, PosedHand] | Outcome] = field(default_factory=dict, compare=False, repr=False)
 
     success: ClassVar[str] = "success"
 
@@ -170,22 +149,21 @@ class GraspExperiment:
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         best_of = self.settings.wrist.best_of
         if trial in self._ahead:
-            tried = self._ahead.pop(trial)
-        elif best_of:
-            tried = self._best_of(best_of, choice, wanted, scale, friction, self._search_seed(trial, rng))
+            ended = self._ahead.pop(trial)
         else:
-            (tried,) = self._closed([self._placed(choice, wanted, scale, rng)], choice, wanted, scale)
-        if isinstance(tried, Outcome):
-            return tried
+            if best_of:
+                found = self._best_of(best_of, choice, wanted, scale, friction, self._search_seed(trial, rng))
+            else:
+                (found,) = self._closed([self._placed(choice, wanted, scale, rng)], choice, wanted, scale)
+            (ended,) = self._posed([found], hand, thing)
+        if isinstance(ended, Outcome):
+            return ended
+        tried, posed = ended
         root = {"root_position": tried.position, "root_rotation": tried.rotation}
-        one_frame = {name: array[None] for name, array in root.items()}
-        poses = poses_from_angles(hand.rig.skeleton, tried.angles[None], **one_frame)
-        wrist = poses.positions[0, hand.rig.skeleton.index("wrist")]
-        placed = dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
-        vertices = hand.covering.deform(poses, device=self.device, threads=1)[0]
+        placed = dict(zip(("wrist_x", "wrist_y", "wrist_z"), posed.wrist, strict=True))
         both = self._closer(choice, wanted, scale).both
-        measured, patches = measure_grasp(hand, thing, both, vertices, friction, self.settings.measuring)
-        kept = {"angles": tried.angles, **root, **_by_segment(patches)}
+        measured = measure_grasp(hand, thing, both, posed.touching, friction, self.settings.measuring)
+        kept = {"angles": tried.angles, **root, **_by_segment(posed.touching.patches)}
         pressed, pressure, message = self._pressed(trial, hand, thing, tried, friction, measured["success"])
         if pressure is not None:
             kept["pressure"] = pressure
@@ -204,7 +182,7 @@ class GraspExperiment:
         return int(rng.integers(2**31))
 
     def _pressed(
-        self, trial: int, hand: Hand, thing: Thing, tried: _Tried, friction: float, success: bool
+        self, trial: int, hand: Hand, thing: Thing, tried: TriedHand, friction: float, success: bool
     ) -> tuple[dict[str, Any], Array | None, str]:
         """Contact results of a successful grasp, if the plan requests them; values, pressure and message."""
         how, weight = self.settings.pressing, self.settings.weight(trial)
@@ -220,20 +198,22 @@ class GraspExperiment:
         return self.settings.combination(trial)[:3]
 
     def look_ahead(self, trials: Sequence[int]) -> None:
-        """Close the hands of similar trials in one batch; the results are bit for bit those of single trials."""
+        """Close and pose similar trials' hands in one batch; the results are, bit for bit, those of single trials."""
         self._ahead.clear()
         if self.settings.wrist.best_of:
             return
         choice, wanted, scale = self.alike(trials[0])
         try:
             placed = [self._placed(choice, wanted, scale, generator(self.seed, trial)) for trial in trials]
-            self._ahead.update(zip(trials, self._closed(placed, choice, wanted, scale), strict=True))
+            closed = self._closed(placed, choice, wanted, scale)
+            ended = self._posed(closed, hand_of(choice), self._thing(wanted, scale))
+            self._ahead.update(zip(trials, ended, strict=True))
         except Exception:  # the trial that failed is found when they are run one by one
             self._ahead.clear()
 
     def _placed(
         self, choice: HandChoice, wanted: ObjectChoice, scale: float, rng: np.random.Generator
-    ) -> _Open | Outcome:
+    ) -> OpenHand | Outcome:
         """Draw one placement from the plan's ranges."""
         hand, thing = hand_of(choice), self._thing(wanted, scale)
         approach = draw_approach(self.settings.wrist, rng, thing.body.size)
@@ -253,13 +233,13 @@ class GraspExperiment:
         root = hand.rig.skeleton.rest[0]
         position = turn @ root + shift + back * approach.direction - root
         rotation = Rotation.from_matrix(turn).as_quat()
-        return _Open(opened.angles, position, rotation, values)
+        return OpenHand(opened.angles, position, rotation, values)
 
     def _closed(
-        self, placed: Sequence[_Open | Outcome], choice: HandChoice, wanted: ObjectChoice, scale: float
-    ) -> list[_Tried | Outcome]:
+        self, placed: Sequence[OpenHand | Outcome], choice: HandChoice, wanted: ObjectChoice, scale: float
+    ) -> list[TriedHand | Outcome]:
         """Close open hands on one object in a batch; outcomes of failed placements are passed through."""
-        hands = [hand for hand in placed if isinstance(hand, _Open)]
+        hands = [hand for hand in placed if isinstance(hand, OpenHand)]
         if not hands:
             return [failed for failed in placed if isinstance(failed, Outcome)]
         closer, angles = self._closer(choice, wanted, scale), np.stack([hand.angles for hand in hands])
@@ -273,10 +253,19 @@ class GraspExperiment:
         closed = closer.close(poses, angles, digits=self.settings.digits, coupling=coupling)
         touches = np.asarray(closed.touching().any(axis=1))
         ended = iter(
-            _Tried(hand.angles, closed.angles[g], hand.position, hand.rotation, bool(touches[g]), hand.values)
+            TriedHand(hand.angles, closed.angles[g], hand.position, hand.rotation, bool(touches[g]), hand.values)
             for g, hand in enumerate(hands)
         )
         return [item if isinstance(item, Outcome) else next(ended) for item in placed]
+
+    def _posed(
+        self, tried: Sequence[TriedHand | Outcome], hand: Hand, thing: Thing
+    ) -> list[tuple[TriedHand, PosedHand] | Outcome]:
+        """Pose closed hands in a batch; outcomes of failed placements are passed through."""
+        closed = [one for one in tried if isinstance(one, TriedHand)]
+        posed = posed_hands(hand, thing, closed, self.settings.measuring.contact, device=self.device)
+        pairs = iter(zip(closed, posed, strict=True))
+        return [one if isinstance(one, Outcome) else next(pairs) for one in tried]
 
     def _best_of(
         self,
@@ -286,7 +275,7 @@ class GraspExperiment:
         scale: float,
         friction: float,
         seed: int,
-    ) -> _Tried | Outcome:
+    ) -> TriedHand | Outcome:
         """The best grasp of ``count`` placements, by ``find_grasp`` as in the script's GRASP … AUTO."""
         posture = self.settings.posture
         assert isinstance(posture, str)
@@ -306,7 +295,7 @@ class GraspExperiment:
         except InputError as error:
             return Outcome("no grasp", message=str(error))
         values = _direction(-found.approach)
-        return _Tried(found.start, found.angles, found.position, found.rotation, bool(found.touching), values)
+        return TriedHand(found.start, found.angles, found.position, found.rotation, bool(found.touching), values)
 
     def pictures(self, trial: int, outcome: Outcome, folder: Path) -> list[Path]:
         """Draw three views of the closed hand and its object, see `draw_grasp`."""
@@ -316,7 +305,7 @@ class GraspExperiment:
         return draw_grasp(hand_of(choice), self._thing(wanted, scale).body, trial, outcome, folder)
 
     def _thing(self, choice: ObjectChoice, scale: float) -> Thing:
-        return thing_of(choice, scale, self.settings.measuring.density, self.device)
+        return thing_of(choice, scale, self.settings.measuring.density)
 
     def _closer(self, hand: HandChoice, choice: ObjectChoice, scale: float) -> Closer:
         return closer_of(hand, choice, scale, self.settings.measuring.density)

@@ -17,6 +17,7 @@ __all__ = ["Approach", "backed_off", "draw_approach", "place_palm"]
 Array = NDArray[np.float64]
 
 _CLEAR = 5e-4  # the open hand starts at least this far from the object [m]
+_ROUNDING = 1e-5  # more than float32 loses of a distance [m]
 _BACKED_OFF = 0.25  # largest distance by which the hand is moved back [m]
 
 
@@ -76,7 +77,10 @@ def place_palm(palm: Palm, approach: Approach, point: Array) -> tuple[Array, Arr
 
 def backed_off(opened: Array, near: NearObject, turn: Array, shift: Array, approach: Approach) -> float | None:
     """How far the open hand must be moved back until it is clear of the object [m]; None if too far."""
-    skin, back = opened @ turn.T + shift, 0.0
+    placed, back = opened @ turn.T + shift, 0.0
+    skin = placed[near.met(placed, approach.direction, _CLEAR + _ROUNDING)]
+    if not len(skin):
+        return back
     while back <= _BACKED_OFF:
         nearest = float(near.least((skin + back * approach.direction)[None])[0])
         if nearest >= _CLEAR:

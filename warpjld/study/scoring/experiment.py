@@ -17,6 +17,7 @@ from warpjld.study.grasping.columns import SCORE_COLUMNS
 from warpjld.study.grasping.load import closer_of, device_identity, hand_of, thing_of
 from warpjld.study.grasping.measure import measure_grasp
 from warpjld.study.grasping.plan import COMPUTING, Measuring
+from warpjld.study.grasping.tried import touching_skins
 from warpjld.study.grasping.variety import varieties
 from warpjld.study.scoring.given import GivenGrasp
 from warpjld.tables.columns import Column
@@ -124,9 +125,10 @@ class ScoreExperiment:
             values |= dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
         local = skin if _at_origin(grasp) else grasp.place.to_local(skin)[0].astype(np.float32)
         both = closer_of(scored.hand, scored.thing, grasp.scale, self.measuring.density).both
-        measured, patches = measure_grasp(hand, thing, both, local, scored.friction, self.measuring)
+        (touching,) = touching_skins(hand, thing, local[None], self.measuring.contact)
+        measured = measure_grasp(hand, thing, both, touching, scored.friction, self.measuring)
         arrays = {} if grasp.angles is None else {f"{scored.hand.name}/angles": grasp.angles}
-        touches = len(patches) > 0
+        touches = len(touching.patches) > 0
         return Outcome("scored" if touches else "no contact", {**values, **measured}, arrays, grasp.message)
 
     def check(self) -> tuple[list[str], list[str]]:
