@@ -15,6 +15,7 @@ from warpjld.covering.operators import fans
 from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.parameters import default_parameters
 from warpjld.covering.segment_table import SegmentTable
+from warpjld.geometry.spatial_order import spatial_order
 from warpjld.geometry.surface import Surface
 from warpjld.rig import Rig
 from warpjld.skeleton import Skeleton
@@ -123,7 +124,7 @@ def test_heat_does_not_depend_on_the_order_its_equations_are_solved_in(built: Ri
     hand = built.surface
     laplacian, area = heat.cotangent_laplacian(hand.vertices, hand.faces, np.full(len(hand.vertices), 0.01))
     right = np.random.default_rng(0).random((len(area), 3)) * area[:, None]
-    order = heat.spatial_order(hand.vertices)
+    order = spatial_order(hand.vertices)
     np.testing.assert_array_equal(np.sort(order), np.arange(len(area)))
     matrix = laplacian + sp.diags_array(area * 100.0)
     found, plain = heat.solve_diffusion(matrix, right, order), heat.solve_diffusion(matrix, right)

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import cotangent_laplacian, solve_diffusion, spatial_order, uniform_laplacian
+from warpjld.covering.heat import cotangent_laplacian, solve_diffusion, uniform_laplacian
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.skull import skull_lines
 from warpjld.errors import InputError
 from warpjld.geometry.normals import vertex_normals
+from warpjld.geometry.spatial_order import spatial_order
 from warpjld.geometry.spread import spread
 from warpjld.rig import Skin
 from warpjld.runtime.lazily import lazy_module

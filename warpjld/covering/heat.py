@@ -27,7 +27,6 @@ __all__ = [
     "cotangent_laplacian",
     "diffused",
     "solve_diffusion",
-    "spatial_order",
     "uniform_laplacian",
 ]
 
@@ -35,7 +34,6 @@ __all__ = [
 # its memory (1.5 kB a vertex) is too large
 _DIRECT_LIMIT = 1_500_000
 _THREAD = 100_000  # smallest number of unknowns times right-hand sides worth a thread of its own
-_BITS = 16  # bits of each coordinate in a Morton code
 _TOLERANCE = 1e-7  # residual at which iterative solvers stop, relative to the right-hand side
 _ACCEPTED = 1e-5  # largest relative residual of an accepted solution
 _MULTIGRID_STEPS = 200  # iteration limit
@@ -103,21 +101,6 @@ def _laplacian(rows: NDArray, columns: NDArray, conducted: NDArray[np.float64], 
     return sp.diags_array(np.asarray(off.sum(axis=1)).ravel()) - off
 
 
-def spatial_order(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Order of the vertices along a Z-order curve through space (Morton, 1966), shape (V,).
-
-    It speeds up factorisation, whose minimum-degree ordering breaks ties by the given order: a third of the time on a
-    mesh of 160,000 vertices numbered by reverse Cuthill-McKee.
-    """
-    low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
-    cells = ((vertices - low) / (size or 1.0) * (2**_BITS - 1)).astype(np.int64)
-    code = np.zeros(len(vertices), dtype=np.int64)
-    for bit in range(_BITS):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return np.argsort(code, kind="stable")
-
-
 def solve_diffusion(
     matrix: sp.sparray, right: NDArray[np.float64], order: NDArray[np.int64] | None = None
 ) -> NDArray[np.float64] | None:
@@ -130,7 +113,7 @@ def solve_diffusion(
     Args:
         matrix: A, shape (V, V).
         right: B, shape (V, n).
-        order: Permutation that brings neighbouring rows together (:func:`spatial_order`), which makes it faster.
+        order: Permutation that brings neighbouring rows together (``geometry.spatial_order``), which makes it faster.
 
     Returns:
         X, shape (V, n), or None where no solver reached the accepted residual.

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError
+from warpjld.geometry.spatial_order import spatial_order
 from warpjld.grasp.feature_normals import face_normals, feature_normals
 from warpjld.grasp.objects import GraspObject, Places
-from warpjld.grasp.space_order import along_curve
 from warpjld.grasp.triangle_tree import build_tree, join_trees
 from warpjld.runtime.query_mesh import query_mesh
 from warpjld.runtime.threads import in_threads, threads_for
@@ -146,7 +146,11 @@ class ObjectSet:
         ]
         reach, run = float(min(limit, 1e9)), _RUN if self.device.is_cpu else 1
         sort = self.device.is_cpu and distance.size > _SORT_ABOVE
-        order = wp.array(along_curve(cloud[0]) if sort else np.empty(0, np.int32), dtype=wp.int32, device=self.device)
+        order = wp.array(
+            spatial_order(cloud[0]).astype(np.int32) if sort else np.empty(0, np.int32),
+            dtype=wp.int32,
+            device=self.device,
+        )
 
         def span(begin: int, end: int) -> None:
             wp.launch(
