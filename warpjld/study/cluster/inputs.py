@@ -10,7 +10,6 @@ from typing import Any
 
 from warpjld.errors import InputError
 from warpjld.files.input_file import read_bytes
-from warpjld.io.identity import files_of
 from warpjld.study.cluster.node import Sent
 
 __all__ = ["sent_inputs"]
@@ -26,6 +25,8 @@ def sent_inputs(paths: Iterable[Path], put: Any) -> tuple[Sent, ...]:
     Raises:
         InputError: One cannot be read.
     """
+    from warpjld.io.identity import files_of  # workers, which import this module, do without
+
     held: dict[str, Any] = {}
     sent = []
     for path in dict.fromkeys(paths):

@@ -85,12 +85,14 @@ def press_grasp(
     except WarpjldError as error:
         return values | {"press": ForceStatus.NO_SOLUTION.name}, None, str(error)
     values["press"] = _ending(found)
+    if found.grips:
+        values["without_share"] = _without_share(short, found.grips[0].left_out)
     if not found.grips or not len(found.frames) or found.frames[-1] <= _CLOSED:
         return values, None, found.verdict.text
     last = float(found.frames[-1])
     rows = [row for row in found.rows if row.frame == last and row.actor == _HAND]
     pressure = found.visible_pressure(_HAND, last).pressure[: hand.rig.surface.vertices.shape[0]]
-    values |= _measured(found, rows) | {"without_share": _without_share(short, found.grips[0].left_out)}
+    values |= _measured(found, rows)
     reached = values["press"] == ForceStatus.REACHED.name
     values["success"] = reached and how.kept(values["force"], asked=asked)
     message = found.grips[0].text if not values["success"] else ""
