@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
@@ -21,7 +22,11 @@ def files() -> Iterator[Path]:
 
 @cache
 def modules() -> list[tuple[Path, ast.Module]]:
-    return [(path, ast.parse(path.read_text(encoding="utf-8"))) for path in files()]
+    gc.disable()  # a million objects without circles: looking for circles among them takes as long as making them
+    try:
+        return [(path, ast.parse(path.read_text(encoding="utf-8"))) for path in files()]
+    finally:
+        gc.enable()
 
 
 def defined(tree: ast.Module) -> set[str]:
@@ -66,11 +71,20 @@ def body_lines(function: ast.FunctionDef) -> int:
     return (function.end_lineno or 0) - body[0].lineno + 1 if body else 0
 
 
+def functions(tree: ast.AST) -> Iterator[ast.FunctionDef]:
+    """Those in statements, however deep: expressions have none."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef):
+            yield node
+        if isinstance(node, ast.stmt | ast.excepthandler | ast.match_case):
+            yield from functions(node)
+
+
 def test_no_function_is_long() -> None:
     long = {}
     for path, tree in modules():
         if path.is_relative_to(ROOT / "warpjld"):
-            for node in ast.walk(tree):
-                if isinstance(node, ast.FunctionDef) and body_lines(node) > LONGEST_FUNCTION:
+            for node in functions(tree):
+                if body_lines(node) > LONGEST_FUNCTION:
                     long[f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"] = body_lines(node)
     assert long == {}
