@@ -50,7 +50,9 @@ def _animation(row: dict[str, Any]) -> Any:
     from pygltflib import Animation, AnimationChannel, AnimationChannelTarget, AnimationSampler
 
     channels = [
-        AnimationChannel(sampler=_whole(one["sampler"]), target=AnimationChannelTarget(**_given(one["target"], _TARGET)))
+        AnimationChannel(
+            sampler=_whole(one["sampler"]), target=AnimationChannelTarget(**_given(one["target"], _TARGET))
+        )
         for one in row.get("channels") or ()
     ]
     samplers = [AnimationSampler(**_given(one, _SAMPLER)) for one in row.get("samplers") or ()]
