@@ -76,9 +76,9 @@ def figure() -> Rig:
 @pytest.fixture(scope="session")
 def bound(hands: dict[str, Rig]) -> Covering:
     """The coarse left hand, bound."""
-    from warpjld.covering import bind
+    from warpjld.covering.kept import bind_kept
 
-    return bind(hands["left"].skeleton, hands["left"].surface)
+    return bind_kept(hands["left"])[0]
 
 
 @pytest.fixture
