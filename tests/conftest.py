@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
 from functools import cache
@@ -38,6 +39,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.timeout(0))
 
 
+# what is imported and collected stays for the whole run: looking for circles among half a million objects again and
+# again is a tenth of the collection's time
+def pytest_collection(session: pytest.Session) -> None:
+    if not session.config.getoption("numprocesses", None):  # else others collect
+        gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.fixture(scope="session")
 def data() -> Path:
     """Folder of third-party assets."""
@@ -63,9 +76,9 @@ def figure() -> Rig:
 @pytest.fixture(scope="session")
 def bound(hands: dict[str, Rig]) -> Covering:
     """The coarse left hand, bound."""
-    from warpjld.covering import bind
+    from warpjld.covering.kept import bind_kept
 
-    return bind(hands["left"].skeleton, hands["left"].surface)
+    return bind_kept(hands["left"])[0]
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from warpjld.cli.calibrate import calibrate_command
-from warpjld.covering import bind_rig
+from warpjld.covering.kept import bind_kept
 from warpjld.covering.parameters import load_parameters, save_parameters
 from warpjld.errors import InputError
 from warpjld.io import load_rig
@@ -62,7 +62,7 @@ def shapes(hand: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     motion = folder / "poses.csv"
     rows = [",".join(["frame", *channels]), *(",".join(map(str, [f, *row])) for f, row in enumerate(angles.tolist()))]
     motion.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    covering = bind_rig(rig)
+    covering, _ = bind_kept(rig)
     wanted = replace(covering.parameters, inflation=covering.parameters.inflation + 0.4)
     poses = load_motion(motion, rig).poses
     vertices = rig.surface.to_source(covering.with_parameters(wanted).deform(poses))
@@ -72,7 +72,7 @@ def shapes(hand: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("own_poses", [True, False])
+@pytest.mark.parametrize("own_poses", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_targets(hand: Path, shapes: Path, tmp_path: Path, own_poses: bool) -> None:
     out = tmp_path / "found.json"
     name = "shapes.npz" if own_poses else "bare.npz"
@@ -91,7 +91,7 @@ def test_targets(hand: Path, shapes: Path, tmp_path: Path, own_poses: bool) -> N
 
 def test_targets_for_people(hand: Path, shapes: Path, tmp_path: Path) -> None:
     out = tmp_path / "found.json"
-    arguments = [str(hand), "-o", str(out), "--targets", str(shapes / "shapes.npz")]
+    arguments = [str(hand), "-o", str(out), "--targets", str(shapes / "shapes.npz"), "--iterations", "2"]
     result = CliRunner().invoke(calibrate_command, arguments, catch_exceptions=False)
     assert "3 target shapes" in result.stdout
     assert "distance, typical [mm]" in result.stdout

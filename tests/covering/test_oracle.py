@@ -54,6 +54,8 @@ def test_built_in_hand(built: Rig, method: Literal["smooth", "paper"]) -> None:
     assert error(built, method) < RELATIVE
 
 
-@pytest.mark.parametrize(("side", "method"), [("right", "smooth"), ("left", "paper")])
+@pytest.mark.parametrize(
+    ("side", "method"), [pytest.param("right", "smooth", marks=pytest.mark.slow), ("left", "paper")]
+)
 def test_webxr_hand(webxr_hands: dict[str, Rig], side: str, method: Literal["smooth", "paper"]) -> None:
     assert error(webxr_hands[side], method) < RELATIVE

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from warpjld.covering import Covering, bind_rig
+from warpjld.covering import Covering
+from warpjld.covering.kept import bind_kept
 from warpjld.covering.skull import skull_lines
 from warpjld.geometry.rotations import rotate
 from warpjld.io import load_rig
@@ -30,7 +31,7 @@ def bodies(data: Path) -> Callable[[str], tuple[Rig, Covering]]:
     @cache
     def bound_body(name: str) -> tuple[Rig, Covering]:
         rig = load_rig(data / name)
-        return rig, bind_rig(rig)
+        return rig, bind_kept(rig)[0]
 
     return bound_body
 

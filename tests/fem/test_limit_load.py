@@ -70,7 +70,7 @@ def test_one_limit_pressure_and_one_text_whatever_the_load() -> None:
 
 
 def test_a_limit_load_raises_where_results_are_checked() -> None:
-    body, held = shell(3)
+    body, held = shell(2)
     with pytest.raises(SolveError, match="limit load"):
         solve(body, held, Loads(pressure={"outer": 12.0 * CLASSICAL}))
 

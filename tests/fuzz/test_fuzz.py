@@ -22,7 +22,7 @@ def test_damaged_files_are_errors_of_one_line(name: str, tmp_path: Path) -> None
     path = sound(name, tmp_path)
     data = path.read_bytes()
     KINDS[name][1](path)  # what is sound is read
-    for n in range(6):
+    for n in range(4):  # ``python -m tests.fuzz`` goes on from there
         path.write_bytes(damaged(data, random.Random(f"{name} {n}")))
         told = tried(name, path)
         assert not told, f"damage {n}: {told}"

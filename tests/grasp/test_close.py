@@ -77,7 +77,13 @@ def test_digits_touch_and_do_not_enter(covering, open_hand, make, coupling) -> N
     assert ((closed.angles[0, :, 0] >= low - 1e-9) & (closed.angles[0, :, 0] <= high + 1e-9)).all()
 
 
-@pytest.mark.parametrize("make", [lambda: ball(0.065, subdivisions=3), lambda: box(0.05, 0.07, 0.03)])
+@pytest.mark.parametrize(
+    "make",
+    [
+        pytest.param(lambda: ball(0.065, subdivisions=3), id="ball"),
+        pytest.param(lambda: box(0.05, 0.07, 0.03), id="box", marks=pytest.mark.slow),
+    ],
+)
 def test_batches_are_single_hands(covering, open_hand, make) -> None:
     """Bit for bit, whatever a hand is closed beside, and whatever the closer closed before."""
     poses, angles = open_hand

@@ -90,7 +90,7 @@ def test_volume_of_hand_and_stub(hand: Rig) -> None:
     assert 350e-6 < volume < 450e-6
 
 
-@pytest.mark.parametrize(("length", "ratio"), [(0.15, 0.50), (0.23, 0.39)])
+@pytest.mark.parametrize(("length", "ratio"), [(0.15, 0.50), pytest.param(0.23, 0.39, marks=pytest.mark.slow)])
 def test_length_and_breadth_as_asked(length: float, ratio: float) -> None:
     rig = build_hand(length=length, breadth=ratio * length, resolution=2000)
     assert -rig.surface.vertices[:, 2].min() == pytest.approx(length, rel=SIZE_TOLERANCE)
@@ -204,7 +204,7 @@ def test_same_bits_every_time(coarse: Rig) -> None:
     np.testing.assert_array_equal(again.surface.faces, coarse.surface.faces)
 
 
-@pytest.mark.parametrize("digit", ["index", "thumb"])
+@pytest.mark.parametrize("digit", [pytest.param("index", marks=pytest.mark.slow), "thumb"])
 def test_proportions_lengthen_and_thicken_one_digit(digit: str, coarse: Rig) -> None:
     other = build_hand(resolution=2000, proportions={digit: (1.2, 1.15)})
     chain = [coarse.skeleton.index(f"{digit}.{name}") for name in ("base", "knuckle2", "knuckle3")]

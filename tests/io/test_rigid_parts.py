@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from tests.covering.tube import SEGMENT, tube, tube_skeleton
-from warpjld.covering import bind_rig
+from warpjld.covering.kept import bind_kept
 from warpjld.covering.quality import unique_edges
 from warpjld.geometry.surface import Part, Surface, weld_surface
 from warpjld.io import load_rig
@@ -145,7 +145,7 @@ def test_eyes_of_a_body_turn_with_the_head(data: Path, domains: str) -> None:
     assert any("rigid to joint 'head'" in note for note in rig.notes)
     angles = np.zeros((1, len(rig.skeleton), len(CHANNELS)))
     angles[0, head, CHANNELS.index("flexion")] = np.radians(50.0)
-    moved = bind_rig(rig, domains=domains).deform(poses_from_angles(rig.skeleton, angles))[0]  # type: ignore[arg-type]
+    moved = bind_kept(rig, domains=domains)[0].deform(poses_from_angles(rig.skeleton, angles))[0]  # type: ignore[arg-type]
     edges = unique_edges(rig.surface.faces)
     edges = edges[(rig.rigid[edges] >= 0).all(axis=1)]
     before, after = (np.linalg.norm(v[edges[:, 1]] - v[edges[:, 0]], axis=1) for v in (rig.surface.vertices, moved))

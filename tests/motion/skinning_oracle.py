@@ -5,14 +5,23 @@ Float64, one frame at a time, nothing of the project in it.
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pygltflib
 from scipy.spatial.transform import Rotation
 
 _TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+class Record(dict[str, Any]):
+    """A JSON object whose members are attributes; None where it has none of that name."""
+
+    def __getattr__(self, name: str) -> Any:
+        return self.get(name)
 
 
 class Skinning:
@@ -25,8 +34,10 @@ class Skinning:
     """
 
     def __init__(self, path: Path, animation: int = 0, node: int | None = None) -> None:
-        self.gltf = pygltflib.GLTF2().load(str(path))
-        self.blob = self.gltf.binary_blob()
+        content = path.read_bytes()
+        (length,) = struct.unpack_from("<I", content, 12)  # of the first chunk, JSON; the other's head is 8 bytes more
+        self.gltf = json.loads(content[20 : 20 + length], object_hook=Record)
+        self.blob = content[28 + length :]
         animations = [self.gltf.animations[animation]] if self.gltf.animations else []
         self.tracks = {}
         for one in animations:

@@ -11,7 +11,7 @@ import pytest
 
 from warpjld.covering import Covering, bind_rig
 from warpjld.errors import InputError
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.page.guard import RequestGuard
 from warpjld.page.view import SurfaceView, ViewedSurface
 from warpjld.skeleton import poses_from_angles
@@ -21,7 +21,7 @@ pytest.importorskip("viser", reason="viser is not installed")
 
 @pytest.fixture(scope="module")
 def covering() -> Covering:
-    return bind_rig(build_hand("left", resolution=1500))
+    return bind_rig(kept_hand("left", resolution=1500))
 
 
 @pytest.fixture

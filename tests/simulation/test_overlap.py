@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from warpjld.covering import bind
+from warpjld.covering.kept import bind_kept
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.rig import Rig
@@ -81,7 +81,7 @@ def test_parts_of_one_ball_are_closed_where_they_part() -> None:
 
 
 def test_a_hand_overlaps_itself_where_digits_cross(rig: Rig, hand: FleshHand) -> None:
-    covering = bind(rig.skeleton, rig.surface)
+    covering, _ = bind_kept(rig)
     angles = np.zeros((len(rig.skeleton), 4))
     rest = covering.deform(poses_from_angles(rig.skeleton, angles[None]))[0].astype(np.float64)
     parts = skin_parts(hand)

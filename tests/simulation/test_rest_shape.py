@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpjld.covering import Covering, bind
+from warpjld.covering import Covering
+from warpjld.covering.kept import bind_kept
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.hand.flesh_hand import FleshHand, build_flesh_hand
 from warpjld.io import load_rig
@@ -19,7 +20,7 @@ from warpjld.skeleton.kinematics import rest_poses
 
 @pytest.fixture(scope="module")
 def covering(rig: Rig) -> Covering:
-    return bind(rig.skeleton, rig.surface)
+    return bind_kept(rig)[0]
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,7 @@ def test_bones_that_crush_flesh_between_them_let_it_go(data: Path) -> None:
     for joint, degrees in (("base", 86), ("knuckle2", 92), ("knuckle3", 75)):
         angles[0, rig.skeleton.index(f"left.pinky.{joint}"), 0] = np.radians(degrees)
     poses = poses_from_angles(rig.skeleton, angles)
-    skin = bind(rig.skeleton, rig.surface).deform(poses)[0].astype(np.float64)
+    skin = bind_kept(rig)[0].deform(poses)[0].astype(np.float64)
     hand, _ = rest_in_pose(built, poses, skin)
     assert hand.mesh.scaled_jacobian().min() > 0.0
     let_go = [len(before) - len(after) for before, after in zip(built.bone_nodes, hand.bone_nodes, strict=True)]

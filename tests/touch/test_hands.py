@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from tests.benchmarks.skin.measures import fold_kinds
 from tests.benchmarks.touch import crossing_before_and_after, largest_leap, random_angles
-from warpjld.covering import bind_rig
 from warpjld.covering.covering import Covering
 from warpjld.covering.intersections import crossing_faces, surface_parts
+from warpjld.covering.kept import bind_kept
 from warpjld.covering.pose_sets import curled
 from warpjld.io import load_rig
 from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
@@ -33,7 +33,7 @@ def bound(name: str) -> tuple[Covering, Touch]:
     path = DATA / HANDS[name]
     if not path.exists():
         pytest.skip("the data folder is not there")
-    covering = bind_rig(load_rig(path))
+    covering = bind_kept(load_rig(path))[0]
     return covering, Touch.of(covering)
 
 

@@ -11,6 +11,7 @@ import pytest
 from tests.finger import finger
 from warpjld.covering import Covering, bind_rig
 from warpjld.covering.intersections import crossing_faces
+from warpjld.covering.kept import bind_kept
 from warpjld.covering.pose_sets import curled
 from warpjld.io.rig_file import load_rig
 from warpjld.skeleton.kinematics import rest_poses
@@ -24,7 +25,7 @@ HAND = Path(__file__).resolve().parents[3] / "shared/data/hand_webxr_generic/rig
 def covering() -> Covering:
     if not HAND.exists():
         pytest.skip("the data folder is not there")
-    return bind_rig(load_rig(HAND))
+    return bind_kept(load_rig(HAND))[0]
 
 
 def test_a_finger_that_touches_nothing_keeps_its_pose() -> None:

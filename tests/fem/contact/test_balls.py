@@ -102,6 +102,7 @@ def test_action_is_reaction_to_a_millionth() -> None:
         )
 
 
+@pytest.mark.slow
 def test_the_same_run_twice_is_the_same_bit_by_bit() -> None:
     runs = []
     for _ in range(2):

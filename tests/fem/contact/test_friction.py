@@ -34,7 +34,7 @@ def test_a_hundredth_less_slides(block: Body) -> None:
     assert "slope" in found.message
 
 
-@pytest.mark.parametrize(("halvings", "told"), [(None, 3), (1, 1), (0, 0)])
+@pytest.mark.parametrize(("halvings", "told"), [(None, 3), pytest.param(1, 1, marks=pytest.mark.slow), (0, 0)])
 def test_steps_are_halved_as_often_as_asked(block: Body, halvings: int | None, told: int) -> None:
     pair = Pair("z-", Plane((0, 0, 0), (0, 0, 1)), friction=0.9 * np.tan(SLOPE))
     lines: list[str] = []

@@ -19,7 +19,7 @@ from warpjld.fem.hand.bone_loads import BoneLoads
 from warpjld.fem.hand.fingertip import Fingertip, build_fingertip
 from warpjld.fem.hand.muscles import Effort, effort_of
 from warpjld.fem.hand.suggestions import DigitSlopes, suggestions
-from warpjld.hand import build_hand
+from warpjld.hand.kept import kept_hand
 from warpjld.simulation.grip.correct import Correction, correct_angles
 from warpjld.skeleton import Skeleton, poses_from_angles
 
@@ -105,7 +105,7 @@ class PressedFinger:
 
 @pytest.fixture(scope="module")
 def finger() -> PressedFinger:
-    rig = build_hand("left")
+    rig = kept_hand("left")
     return PressedFinger(rig.skeleton, build_fingertip(rig, "index", 0.002))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import json
 from contextlib import AbstractContextManager
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +21,7 @@ from warpjld.geometry.scales import never_zero, regular_linear
 from warpjld.io.gltf.accessor import read_accessor
 from warpjld.io.gltf.container import read_container
 from warpjld.io.gltf.extensions import check_extensions, packed_view
+from warpjld.io.gltf.objects import gltf_objects
 from warpjld.io.gltf.schema import check_schema, inside_folder
 from warpjld.runtime.lazily import lazy_module
 
@@ -34,10 +34,6 @@ __all__ = ["Document", "open_document"]
 
 _FURTHEST = 1e12  # largest plausible coordinate in the file's units
 _KIND = "a glTF 2.0 file"
-_NODE = (
-    *("camera", "children", "extensions", "extras", "matrix", "mesh", "name"),
-    *("rotation", "scale", "skin", "translation"),
-)
 _UNPACK = "export it without compression"
 
 
@@ -249,23 +245,11 @@ def open_document(path: str | Path) -> Document:
     _, content, blob = read_container(path)
     with reading(path, _KIND):
         check_schema(content)
-        gltf = _tree(content)
+        gltf = gltf_objects(content)
         check_extensions(gltf)
     if blob is not None:
         gltf.set_binary_blob(blob)
     return Document(path, gltf, content)
-
-
-def _tree(content: dict[str, Any]) -> Any:
-    """A document as pygltflib's objects. Nodes are made one by one: its general decoder takes half a millisecond for
-    each, which is seconds for a scene of many."""
-    from pygltflib import GLTF2, Node
-
-    gltf = GLTF2.gltf_from_json(json.dumps({key: value for key, value in content.items() if key != "nodes"}))
-    gltf.nodes = [
-        Node(**{key: row[key] for key in _NODE if row.get(key) is not None}) for row in content.get("nodes") or ()
-    ]
-    return gltf
 
 
 def _invertible(linear: NDArray[np.float64]) -> bool:

@@ -60,7 +60,7 @@ def find_branches(solid: VoxelSolid, distance: NDArray[np.float64], least: float
             peaks.append(voxel)
             own.append([])
             pieces = {union_parent[-1]}
-        first = max(pieces, key=lambda p: distance[peaks[p]])
+        first = max(pieces, key=lambda p: distance[peaks[p]]) if len(pieces) > 1 else next(iter(pieces))
         for piece in pieces - {first}:
             length = float(distance[peaks[piece]] - distance[voxel])
             if length >= least:
