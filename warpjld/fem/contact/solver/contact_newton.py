@@ -45,6 +45,9 @@ _STALLED, _LESS = 12, 0.9
 its least value meanwhile. Of 49 converged searches in grasps none waited for more than 6; those that ended at the limit
 of iterations had waited for 29 and more. Not used for bodies held by contact alone."""
 
+_SAME = 1e-10
+"""Largest difference of a guess, over the bodies' size, that is none."""
+
 
 class ContactNewton:
     """Newton solver of a contact problem; keeps matrices and preconditioners between load steps.
@@ -60,6 +63,7 @@ class ContactNewton:
         solves: Number of linear solves so far.
         iterations: Number of their iterations.
         most: Most Newton iterations of a search.
+        once: Whether a failed search from a guess is the last one: the caller tries another step.
         allowed: Number of linear solves from which on a search ends.
         failure: Reason why no equilibrium was found; empty if not known.
     """
@@ -69,7 +73,7 @@ class ContactNewton:
     ) -> None:
         self.body = body
         self.solves = self.iterations = 0
-        self.failure, self.most, self.allowed = "", _ITERATIONS, np.inf
+        self.failure, self.most, self.allowed, self.once = "", _ITERATIONS, np.inf, False
         self._accuracy = {"tolerance": tolerance, "penetration": penetration}
         self._free: tuple[bytes, UnconstrainedBodies] | None = None
         self._elastic = Elastic(body)
@@ -83,7 +87,8 @@ class ContactNewton:
         """Equilibrium of a load step from displacement u (3N,) and contact states at ``step.before``.
 
         The search starts from the guess with the smallest residual among those without inverted elements; if it fails
-        or there is none, from u, with the Dirichlet values applied in the first Newton step.
+        or there is none, from u, with the Dirichlet values applied in the first Newton step (after a failure not with
+        ``once``).
         """
         begun = [
             NewtonState(self._elastic, self._system, step, u, states, guess, **self._accuracy)
@@ -93,14 +98,14 @@ class ContactNewton:
         begun.sort(key=NewtonState.left_over)
         status, found = SolveStatus.MAX_ITERATIONS, None
         # a guess equal to u, with its Dirichlet values, would repeat the same search
-        same = bool(begun) and np.array_equal(begun[0].u, u)
+        same = bool(begun) and float(np.abs(begun[0].u - u).max()) <= _SAME * self.body.mesh.size
         if begun:
             status, found = self._search(begun[0], step)
-        if found is None and not same and status not in (SolveStatus.UNHELD, SolveStatus.SLIDING):
-            again, found = self._search(
-                NewtonState(self._elastic, self._system, step, u, states, None, **self._accuracy), step
-            )
-            status = status if begun and found is None else again
+        again = not (begun and (same or self.once))
+        if found is None and again and status not in (SolveStatus.UNHELD, SolveStatus.SLIDING):
+            state = NewtonState(self._elastic, self._system, step, u, states, None, **self._accuracy)
+            other, found = self._search(state, step)
+            status = status if begun and found is None else other
         return status, found
 
     def _search(self, state: NewtonState, step: LoadStep) -> tuple[SolveStatus, Equilibrium | None]:
