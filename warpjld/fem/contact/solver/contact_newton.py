@@ -37,7 +37,9 @@ _RESTARTS = 2
 _HOPELESS, _FAR = 10, 0.3
 """Iteration at which a search is abandoned if its relative residual was never below the second number. Of 225 converged
 searches in grasps none would have been abandoned; 381 of 1,615 futile iterations were saved. Not used for bodies held
-by contact alone: forces on them are small, and balance last."""
+by contact alone, on which forces are small and balance last, unless the caller tries a shorter step: of 34 searches of
+two lifts with more than 6 iterations, the 22 that converged were at 0.24 or less by then (21 of them at 0.02), and 6 of
+the 12 others above 0.3."""
 _LOST, _NEAR = 20, 0.05
 """The same for bodies held by contact alone; searches beyond that seldom converge, and shorter steps take fewer."""
 _STALLED, _LESS = 12, 0.9
@@ -126,9 +128,10 @@ class ContactNewton:
             if not np.isfinite(state.unbalanced):
                 return SolveStatus.NOT_FINITE, None
             nearest = min(nearest, state.unbalanced)
-            turns, near = (_LOST, _NEAR) if unconstrained else (_HOPELESS, _FAR)
+            far = turn >= _HOPELESS and nearest > _FAR and (self.once or not unconstrained)
+            far = far or (turn >= _LOST and nearest > _NEAR and bool(unconstrained))
             least, stalled = (state.unbalanced, 0) if state.unbalanced < _LESS * least else (least, stalled + 1)
-            if (turn >= turns and nearest > near) or (stalled >= _STALLED and not unconstrained):
+            if far or (stalled >= _STALLED and not unconstrained):
                 break
             if self.solves >= self.allowed:
                 return SolveStatus.EXHAUSTED, None
