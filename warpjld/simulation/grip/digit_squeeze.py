@@ -39,9 +39,12 @@ class DigitSqueeze:
         joints: Digit, as in its efforts → indices of the joints that flex.
         after: Initial equilibrium.
         limits: Digit → force limit that differs from the default [N].
+        wanted: Force of each digit of which its share is measured [N], shape (D,); by default shares are those of its
+            muscles.
 
     Attributes:
         digits: Names of the digits that close, in the order of all arrays.
+        joints: Joints of each.
         solved: Equilibria solved so far, beside the initial one.
     """
 
@@ -53,9 +56,11 @@ class DigitSqueeze:
         joints: Mapping[str, Sequence[int]],
         after: ContactSolution,
         limits: Mapping[str, float] | None = None,
+        wanted: Array | None = None,
     ) -> None:
         self._model, self._history, self._hand, self._limits = model, history, hand, limits
-        self.digits, self._joints = tuple(joints), [list(one) for one in joints.values()]
+        self._wanted = wanted
+        self.digits, self.joints = tuple(joints), [list(one) for one in joints.values()]
         self._start, self._time = hand.bones.angles(after.last.time), after.last.time
         self._bounds = hand.bones.skeleton.limits[:, FLEXION]
         self._known: list[tuple[Array, ContactSolution]] = [(np.zeros(len(self.digits)), after)]
@@ -65,14 +70,14 @@ class DigitSqueeze:
     def range(self) -> tuple[Array, Array]:
         """Closings at which the last joint of each digit reaches its limit [rad], each of shape (D,)."""
         now = self._start[:, FLEXION]
-        low = [float((self._bounds[one, 0] - now[one]).min()) for one in self._joints]
-        high = [float((self._bounds[one, 1] - now[one]).max()) for one in self._joints]
+        low = [float((self._bounds[one, 0] - now[one]).min()) for one in self.joints]
+        high = [float((self._bounds[one, 1] - now[one]).max()) for one in self.joints]
         return np.minimum(low, 0.0), np.maximum(high, 0.0)
 
     def angles(self, grips: Array) -> Array:
         """Joint angles at closings (D,) [rad], shape (J, 4)."""
         out = self._start.copy()
-        for joints, grip in zip(self._joints, grips, strict=True):
+        for joints, grip in zip(self.joints, grips, strict=True):
             now = out[joints, FLEXION]
             low, high = np.minimum(self._bounds[joints, 0], now), np.maximum(self._bounds[joints, 1], now)
             out[joints, FLEXION] = np.clip(now + grip, low, high)
@@ -86,6 +91,8 @@ class DigitSqueeze:
         effort = self.effort(grips, closed.last)
         mine = [effort[digit] for digit in self.digits]
         forces, shares = (np.array([getattr(one, name) for one in mine]) for name in ("force", "share"))
+        if self._wanted is not None:
+            shares = forces / self._wanted
         return PressedDigits(forces, shares, self._slopes(grips, closed, effort) if closed.last.touches else None)
 
     def effort(self, grips: Array, instant: ContactInstant) -> Effort:
@@ -139,9 +146,11 @@ class DigitSqueeze:
                     return self._posed(angles + by * along)
 
                 found = efforts.slopes(response, change, pose)
-                out[:, j] = [
-                    found[effort[digit].digit].shares[k] for digit, k in zip(self.digits, largest, strict=True)
-                ]
+                each = [found[effort[digit].digit] for digit in self.digits]
+                if self._wanted is not None:
+                    out[:, j] = np.array([one.force for one in each]) / self._wanted
+                else:
+                    out[:, j] = [one.shares[k] for one, k in zip(each, largest, strict=True)]
         except SensitivityError:
             return None
         return out
@@ -149,7 +158,7 @@ class DigitSqueeze:
     def _along(self, grips: Array) -> list[Array]:
         """Derivatives of the angles by each closing, each of shape (J, 4); 0 for joints at their limits."""
         angles, out = self.angles(grips), []
-        for joints in self._joints:
+        for joints in self.joints:
             along = np.zeros_like(angles)
             now = angles[joints, FLEXION]
             along[joints, FLEXION] = (now < self._bounds[joints, 1] - SAME_CLOSING) & (

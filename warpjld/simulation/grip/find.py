@@ -13,6 +13,7 @@ from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.balanced import BalancedGrip, balanced_grip, with_balance
 from warpjld.simulation.grip.find_shared import find_shared
 from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.found import FoundGrip, SupportRelease, digits_that_press, trial_row
@@ -63,11 +64,22 @@ def find_grip(
     squeeze = Squeeze(model, history, hand, joints, after, limits, budget)
     most = max(min(request.most, squeeze.room), 1e-6)
     found = _gentlest(request, squeeze, most, tell) if request.lift else _firm(request, squeeze, most, tell)
+    if not request.lift and not request.digits and found.status == ForceStatus.REACHED.name:
+        balanced = balanced_grip(request, squeeze, found.grip, joints, _START, tell)
+        if balanced is not None:
+            return replace(with_balance(found, balanced), edits=_closed_edits(hand, request, balanced))
     release = None
     if found.lowered is not None:
         begins, free = request.middle - model.start, request.last - model.start
         release = SupportRelease(request.object, begins, free, found.lowered)
     return replace(found, edits=_edits(hand, request, joints, found.grip), release=release)
+
+
+def _closed_edits(hand: FleshBody, request: GripSpecification, balanced: BalancedGrip) -> tuple[AngleEdit, ...]:
+    """Edits that close every digit by its own angle."""
+    flexions = balanced.angles[:, FLEXION]
+    joints = (joint for one in balanced.joints for joint in one)
+    return tuple(AngleEdit(hand.name, joint, request.first, None, float(flexions[joint])) for joint in joints)
 
 
 def _edits(hand: FleshBody, request: GripSpecification, joints: Sequence[int], grip: float) -> tuple[AngleEdit, ...]:

@@ -99,6 +99,7 @@ def share_force(
     start: float,
     tolerance: float = 0.02,
     even: float = 0.05,
+    begin: Array | None = None,
 ) -> SharedGrip:
     """Find closings from 0 on at which the digits' shares are equal and their forces sum to ``force``.
 
@@ -110,6 +111,7 @@ def share_force(
         start: First step of a digit that does not press.
         tolerance: Relative tolerance of the sum.
         even: Largest difference of a share from the mean of the shares, relative to it.
+        begin: Closings of the first trial, shape (D,); 0 by default.
 
     Raises:
         InputError: Ranges that do not contain 0, a force, strength or step that is not above 0.
@@ -120,7 +122,7 @@ def share_force(
         raise InputError(f"grip: want digits that may close from 0 on, got ranges {search.low} to {search.high}")
     if not (force > 0.0 and np.isfinite(force) and start > 0.0 and (search.strengths > 0.0).all()):
         raise InputError(f"grip: want force, strengths and step above 0, got {force}, {search.strengths}, {start}")
-    grips, lost = np.zeros(len(search.low)), 0
+    grips, lost = np.zeros(len(search.low)) if begin is None else np.clip(begin, search.low, search.high), 0
     for _ in range(_ROUNDS):
         try:
             found = press(grips.copy())

@@ -44,7 +44,8 @@ class Squeeze:
         budget: Linear solves that the search may take; by default without a bound.
 
     Attributes:
-        model, history, hand: As given.
+        model, history, hand, limits: As given.
+        first: Initial equilibrium.
         time: Time of the initial equilibrium [frames].
         budget: Linear solves so far, and left.
     """
@@ -60,9 +61,10 @@ class Squeeze:
         budget: SearchBudget | None = None,
     ) -> None:
         self.model, self.history, self.hand = model, history, hand
-        self._joints, self._limits = list(joints), limits
+        self._joints, self.limits = list(joints), limits
         self._start = hand.bones.angles(after.last.time)
         self.time, self.budget = after.last.time, budget or SearchBudget(None)
+        self.first = after
         self._closed: dict[float, ContactSolution] = {0.0: after}
         self._failed: dict[float, ContactSolution] = {}
 
@@ -116,7 +118,7 @@ class Squeeze:
         bones, along, angles = self.hand.bones, self.along(grip), self.angles(grip)
         try:
             tangent, change = self.tangent(grip, closed)
-            contact, limits = tangent.contact.sum(axis=0), self._limits
+            contact, limits = tangent.contact.sum(axis=0), self.limits
             poses = bones.posed(angles, self.time)
             efforts = EffortTangent(self.model, self.hand, closed.last, contact, poses, limits)
             response = tangent.response(change)
@@ -132,7 +134,7 @@ class Squeeze:
     def effort(self, grip: float, instant: ContactInstant) -> Effort:
         """Effort of the muscles at a grip."""
         poses = self.hand.bones.posed(self.angles(grip), self.time)
-        return effort_at(self.model, self.hand, poses, instant, self._limits)
+        return effort_at(self.model, self.hand, poses, instant, self.limits)
 
     @property
     def _high(self) -> NDArray[np.float64]:

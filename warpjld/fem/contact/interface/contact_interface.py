@@ -90,13 +90,14 @@ class Interface:
     def points(self, x: Array, before: float, time: float, normals: Array | None = None) -> ContactPoints:
         """Contact points at positions x (N, 3) [m] and a time, for a step that began at ``before``.
 
-        ``normals`` of the slave nodes (m, 3), for mortar interfaces, are those at x unless given.
+        ``normals`` of the slave nodes (m, 3), for bonded mortar interfaces, are those at x unless given.
         """
         if self.mortar is None:
             probe = self._at_nodes(x, time) if self.pair.sites == "nodes" else self._at_faces(x, time)
             found = self._against(probe, before, time)
         else:
-            return self.mortar.points(x, self.reach, self.slave.normals(x) if normals is None else normals)
+            known = self.slave.normals(x) if normals is None else normals
+            return self.mortar.points(x, self.reach, known, facing=self.slides)
         if self.pair.offset is None:
             return found
         return replace(found, gap=found.gap - abs(found.weights) @ self.pair.offset)

@@ -15,6 +15,7 @@ from warpjld.fem.contact.interface.pair_filter import counted_share
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.launch import on_rows, shared
+from warpjld.geometry.rotations import unit
 
 __all__ = ["Mortar"]
 
@@ -104,10 +105,17 @@ class Mortar:
         self._near: _Near | None = None
         self._last: tuple[Array, float, Ints32, Array] | None = None
 
-    def points(self, x: Array, reach: float, normals: Array) -> ContactPoints:
-        """Contact points at positions x (N, 3) [m] with slave normals (m, 3).
+    def points(self, x: Array, reach: float, normals: Array, *, facing: bool = False) -> ContactPoints:
+        """Contact points at positions x (N, 3) [m].
 
         Only facets that face each other with a distance or depth of at most ``reach`` [m] count.
+
+        Args:
+            x: Positions of the body's nodes [m], shape (N, 3).
+            reach: Search distance [m].
+            normals: Normals of the slave's nodes, shape (m, 3).
+            facing: Whether points have instead the mean normals of those parts of their faces that face the other side
+                (``facing_normals``).
         """
         slave, master = self.slave, self.master
         pairs, found = self._facing(x, reach)
@@ -127,12 +135,34 @@ class Mortar:
         table = table[nodes]
         table.data /= np.repeat(area[nodes], np.diff(table.indptr))
         table.sort_indices()
-        normal = normals[nodes]
+        normal = self.facing_normals(x, pairs, found)[nodes] if facing else normals[nodes]
         gap = np.asarray(-np.einsum("mi,mi->m", normal, table @ x), np.float64)
         gap += self.sliver_offset(nodes, area[nodes])[0]
         if self.offset is not None:
             gap -= self.sliver_share(nodes, area[nodes])[0] * (abs(table) @ self.offset)
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
+
+    def facing_normals(self, x: Array, pairs: Ints32, integrals: Array) -> Array:
+        """Mean normals n = v / |v|, v = Σ ∫ N_a dA n_f over the parts of each node's faces that face the other side.
+
+        At a ridge of the slave of which one side touches, the mean over all faces (as at other nodes) would point past
+        the other side: the gap along it would shrink by the cosine, but not the offset of the visible surface; pressure
+        would push sideways, and bending the ridge inwards could close the gap instead of opening it.
+
+        Args:
+            x: Positions of the body's nodes [m], shape (N, 3).
+            pairs: Facets that face each other, shape (P, 2).
+            integrals: Their mortar integrals, shape (P, 33).
+
+        Returns:
+            Unit normals of the slave's nodes, 0 where nothing faces them, shape (m, 3).
+        """
+        slave = self.slave
+        share = integrals[:, :16].reshape(-1, 4, 4).sum(axis=2)
+        each = share[:, :, None] * unit(slave.area_vectors(x)[pairs[:, 0]])[:, None]
+        where = slave.corners[pairs[:, 0]].ravel()
+        columns = each.reshape(-1, 3).T
+        return unit(np.stack([np.bincount(where, column, len(slave.nodes)) for column in columns], axis=1))
 
     def met_by(self, label: int) -> Mask:
         """Mask of the master facets that slave facets of a label may touch, shape (G,)."""

@@ -17,7 +17,8 @@ from warpjld.fem.contact.obstacles.obstacle import Obstacle
 from warpjld.fem.contact.results.contact_solution import LastStep
 from warpjld.fem.contact.sensitivity.obstacle_slopes import ObstacleSlopes, obstacle_slopes
 from warpjld.fem.contact.sensitivity.perturbation import ObstacleTwist
-from warpjld.fem.contact.solver.tangent import FacetPairs, block_table, inner_rows, normal_derivatives
+from warpjld.fem.contact.solver.facet_pairs import FacetPairs
+from warpjld.fem.contact.solver.tangent import block_table, inner_rows
 from warpjld.geometry.rotations import unit
 
 __all__ = ["InterfaceSlopes", "interface_slopes"]
@@ -234,7 +235,7 @@ def _by_mortar(
     assert mortar is not None
     count = len(points.sites)
     pairs = FacetPairs(mortar, points, rows, x, interface.reach)
-    turning = normal_derivatives(mortar.slave, x, points.sites, rows)
+    turning = pairs.normals()
     table = block_table(points.weights)
     apart = points.weights @ x
     gap = pairs.gaps() - inner_rows(apart) @ turning - inner_rows(points.normal) @ table

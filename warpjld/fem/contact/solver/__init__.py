@@ -1,7 +1,8 @@
 """Contact solver: augmented Lagrangian method with Newton's method on bodies and contact together, in load steps.
 
 Notation: u displacement, x = X + u; of contact point a: area A, weights W (mortar weights, or a single node against an
-obstacle), unit normal n towards the other side, gap g = −n·(W x), slip s = (I − n nᵀ) W (u − u₀) since the start of the
+obstacle), unit normal n towards the other side (between meshes: the mean over those parts of the node's faces that face
+it, ``Mortar.facing_normals``), gap g = −n·(W x), slip s = (I − n nᵀ) W (u − u₀) since the start of the
 load step (minus the obstacle's own motion), multipliers λ_n ≥ 0 and λ_t, penalty ε, friction coefficient μ. Equation
 numbers are those of this file.
 

@@ -40,7 +40,8 @@ _HALVINGS_UNHELD = 3
 _UNHELD = (SolveStatus.SLIDING, SolveStatus.UNHELD)
 """Statuses of a body that slides away or is not held."""
 _BRIEF = 25
-"""Most Newton iterations of a search if no step may be halved: the caller will try a shorter step itself."""
+"""Most Newton iterations of a search if no step may be halved: the caller will try a shorter step itself. For the same
+reason there is then one search."""
 _BREAKS = 100
 """Most rounds of breaking bonds in a load step."""
 _CUTS = 400
@@ -97,7 +98,7 @@ class LoadSteps:
         self.passing = Passing(body, self.interfaces)
         self.newton = ContactNewton(body, self.interfaces, self.moduli, tolerance=tolerance, penetration=penetration)
         if halvings == 0:
-            self.newton.most = _BRIEF
+            self.newton.most, self.newton.once = _BRIEF, True
         if after is None:
             self.start = 0.0
             self.u = np.zeros(body.degrees)

@@ -13,25 +13,23 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
+from scipy.sparse import csr_array, diags_array, eye_array, kron, vstack
 
-from warpjld.fem.arrays import Array, Ints, Ints32, cross_matrix
+from warpjld.fem.arrays import Array, Ints32
 from warpjld.fem.assembly.block_matrix import BlockMatrix
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.mortar import Mortar
-from warpjld.fem.contact.interface.surface import ContactSurface
 from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.law.return_mapping import ContactTractions
+from warpjld.fem.contact.solver.facet_pairs import FacetPairs
 from warpjld.fem.launch import on_rows, shared
 
 __all__ = [
-    "FacetPairs",
     "MortarTangent",
     "block_table",
     "friction_coupling",
     "inner_rows",
     "linearise_mortar",
-    "normal_derivatives",
     "with_contact",
 ]
 
@@ -156,7 +154,7 @@ def linearise_mortar(
     edge = mortar.slave.edge[points.sites]
     rows = np.flatnonzero(tractions.active | (points.gap < _NEAR * edge))
     pairs = FacetPairs(mortar, points, rows, x, reach)
-    turning = normal_derivatives(mortar.slave, x, points.sites, rows)
+    turning = pairs.normals()
     pressure = np.where(tractions.active, np.maximum(state.pressure[points.sites], 0.0), 0.0)
     carried = np.where(tractions.active[:, None], state.friction[points.sites], 0.0)
     of_weights = pairs.forces(carried - pressure[:, None] * points.normal)
@@ -196,90 +194,6 @@ def friction_coupling(points: ContactPoints, tractions: ContactTractions, fricti
         of_gap = of_gap + points.gap_derivative
     rubs = weights.T @ inner_rows(points.area[:, None] * along).T
     return csr_array(rubs @ (diags_array(friction * penalty) @ of_gap))
-
-
-class FacetPairs:
-    """Facet pairs of some contact points, with the derivatives of their mortar integrals.
-
-    Attributes:
-        rows: Indices of the points, among m.
-        corner: Point at each corner of the slave facets, -1 for none of these, shape (P, 4).
-        column: Degrees of freedom of the corners, slave's first, shape (P, 24).
-        own: Derivatives of ∫ N_a N_b with respect to them, shape (P, 24, 4, 4).
-        far: Derivatives of ∫ N_a M_b, likewise.
-    """
-
-    def __init__(self, mortar: Mortar, points: ContactPoints, rows: Ints, x: Array, reach: float) -> None:
-        assert points.facets is not None
-        assert points.share is not None
-        slave = mortar.slave
-        number = np.full(len(slave.nodes), -1)
-        number[points.sites[rows]] = rows
-        chosen = (number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)
-        facets, share = points.facets[chosen], points.share[chosen]
-        nodes = np.concatenate([slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]], axis=1)
-        self.rows = rows
-        self.corner = number[slave.corners[facets[:, 0]]]
-        self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
-        self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
-        change = mortar.derivatives(facets, x, reach)
-        change *= share[:, None, None]
-        self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
-
-    def gaps(self) -> Any:
-        """Derivatives of the gaps through the weights, ``csr_array`` (m, 3N)."""
-        points, corner, at = self._points, self.corner, self._at
-        spread = np.matmul(self.own, at[:, None, :4]) - np.matmul(self.far, at[:, None, 4:])
-        off, per_area = self._mortar.sliver_offset(points.sites, points.area)
-        wider = self.own.sum(axis=3)
-        mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
-        if self._mortar.offset is not None:
-            share, by_area = self._mortar.sliver_share(points.sites, points.area)
-            offset = self._mortar.offset[self.column[:, ::3] // 3]
-            outside = np.einsum("pkab,pb->pka", self.own, offset[:, :4])
-            outside += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
-            mean += share[corner][:, None] * outside
-            per_area = per_area - by_area * (abs(points.weights) @ self._mortar.offset)
-        gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
-        where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
-        row = np.broadcast_to(corner[:, None], gap.shape)[where]
-        column = np.broadcast_to(self.column[:, :, None], gap.shape)[where]
-        return csr_array(coo_array((gap[where], (row, column)), shape=(len(points.sites), self._size)))
-
-    def forces(self, traction: Array) -> Any:
-        """Derivatives of the nodal forces of tractions (m, 3) through the weights [N/m], ``csr_array`` (3N, 3N)."""
-        known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
-        loaded = known.any(axis=(1, 2))
-        known, column = known[loaded], self.column[loaded]
-        # axes: facet pair, degree of freedom that moves, node that is loaded
-        pushed = [np.matmul(part[loaded].transpose(0, 1, 3, 2), known[:, None]) for part in (self.own, -self.far)]
-        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)
-        row = np.broadcast_to(column[:, None, :], block.shape)
-        column = np.broadcast_to(column[:, :, None], block.shape)
-        shape = (self._size, self._size)
-        return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
-
-
-def normal_derivatives(surface: ContactSurface, x: Array, sites: Ints, rows: Ints) -> Any:
-    """Derivatives of the nodal normals, ``csr_array`` (3m, 3N), zero except at ``rows``."""
-    number = np.full(len(surface.nodes), -1)
-    number[sites[rows]] = rows
-    faces = np.flatnonzero((number[surface.corners] >= 0).any(axis=1))
-    quads, corner = surface.quads[faces], number[surface.corners[faces]]
-    length = np.linalg.norm(surface.at_nodes(surface.area_vectors(x)), axis=1)[surface.corners[faces]]
-    length = np.where(length > 0.0, length, 1.0)
-    a, b, c, d = (x[quads[:, k]] for k in range(4))
-    # derivatives of (c − a) × (d − b) / 8: each corner gets a quarter of the face's area vector
-    along, across = cross_matrix(c - a), cross_matrix(d - b)
-    each = 0.125 * np.stack([across, -along, -across, along], axis=1)  # face, node, 3, 3
-    n = surface.normals(x)[surface.corners[faces]]
-    plane = np.eye(3) - n[:, :, :, None] * n[:, :, None, :]
-    block = np.einsum("faij,fbjk->fabik", plane, each) / length[:, :, None, None, None]
-    known = np.broadcast_to((corner >= 0)[:, :, None, None, None], block.shape)
-    row = np.broadcast_to((3 * corner[:, :, None] + np.arange(3))[:, :, None, :, None], block.shape)
-    column = np.broadcast_to((3 * quads[:, :, None] + np.arange(3))[:, None, :, None, :], block.shape)
-    shape = (3 * len(sites), x.size)
-    return csr_array(coo_array((block[known], (row[known], column[known])), shape=shape))
 
 
 def inner_rows(vectors: Array) -> Any:

@@ -1,0 +1,109 @@
+"""Derivatives of what contact points are made of, weights and normals, facet pair by facet pair."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from warpjld.fem.arrays import Array, Ints, cross_matrix
+from warpjld.fem.contact.interface.contact_points import ContactPoints
+from warpjld.fem.contact.interface.mortar import Mortar
+
+__all__ = ["FacetPairs"]
+
+
+class FacetPairs:
+    """Facet pairs of some contact points, with the derivatives of their mortar integrals.
+
+    Attributes:
+        rows: Indices of the points, among m.
+        corner: Point at each corner of the slave facets, -1 for none of these, shape (P, 4).
+        column: Degrees of freedom of the corners, slave's first, shape (P, 24).
+        own: Derivatives of ∫ N_a N_b with respect to them, shape (P, 24, 4, 4).
+        far: Derivatives of ∫ N_a M_b, likewise.
+    """
+
+    def __init__(self, mortar: Mortar, points: ContactPoints, rows: Ints, x: Array, reach: float) -> None:
+        assert points.facets is not None
+        assert points.share is not None
+        slave = mortar.slave
+        number = np.full(len(slave.nodes), -1)
+        number[points.sites[rows]] = rows
+        chosen = (number[slave.corners[points.facets[:, 0]]] >= 0).any(axis=1)
+        facets, share = points.facets[chosen], points.share[chosen]
+        nodes = np.concatenate([slave.quads[facets[:, 0]], mortar.master.quads[facets[:, 1]]], axis=1)
+        self.rows = rows
+        self.corner = number[slave.corners[facets[:, 0]]]
+        self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
+        self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
+        found = mortar.integrals(facets, slave.quads, mortar.master.quads, x, reach)
+        self._area = share[:, None] * found[:, :16].reshape(-1, 4, 4).sum(axis=2)
+        change = mortar.derivatives(facets, x, reach)
+        change *= share[:, None, None]
+        self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
+
+    def gaps(self) -> Any:
+        """Derivatives of the gaps through the weights, ``csr_array`` (m, 3N)."""
+        points, corner, at = self._points, self.corner, self._at
+        spread = np.matmul(self.own, at[:, None, :4]) - np.matmul(self.far, at[:, None, 4:])
+        off, per_area = self._mortar.sliver_offset(points.sites, points.area)
+        wider = self.own.sum(axis=3)
+        mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
+        if self._mortar.offset is not None:
+            share, by_area = self._mortar.sliver_share(points.sites, points.area)
+            offset = self._mortar.offset[self.column[:, ::3] // 3]
+            outside = np.einsum("pkab,pb->pka", self.own, offset[:, :4])
+            outside += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
+            mean += share[corner][:, None] * outside
+            per_area = per_area - by_area * (abs(points.weights) @ self._mortar.offset)
+        gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
+        where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
+        row = np.broadcast_to(corner[:, None], gap.shape)[where]
+        column = np.broadcast_to(self.column[:, :, None], gap.shape)[where]
+        return csr_array(coo_array((gap[where], (row, column)), shape=(len(points.sites), self._size)))
+
+    def forces(self, traction: Array) -> Any:
+        """Derivatives of the nodal forces of tractions (m, 3) through the weights [N/m], ``csr_array`` (3N, 3N)."""
+        known = np.where(self.corner[:, :, None] >= 0, traction[self.corner], 0.0)
+        loaded = known.any(axis=(1, 2))
+        known, column = known[loaded], self.column[loaded]
+        # axes: facet pair, degree of freedom that moves, node that is loaded
+        pushed = [np.matmul(part[loaded].transpose(0, 1, 3, 2), known[:, None]) for part in (self.own, -self.far)]
+        block = np.concatenate(pushed, axis=2).reshape(-1, 24, 24)
+        row = np.broadcast_to(column[:, None, :], block.shape)
+        column = np.broadcast_to(column[:, :, None], block.shape)
+        shape = (self._size, self._size)
+        return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
+
+    def normals(self) -> Any:
+        """Derivatives of the points' normals (``Mortar.facing_normals``), ``csr_array`` (3m, 3N)."""
+        points, corner = self._points, self.corner
+        count = len(points.sites)
+        normal, turned = self._facet_normals()
+        change = self.own.sum(axis=3)[:, :, :, None] * normal[:, None, None]
+        change[:, :12] += self._area[:, None, :, None] * turned[:, :, None]
+        total = np.zeros((count, 3))
+        known = corner >= 0
+        np.add.at(total, corner[known], (self._area[:, :, None] * normal[:, None])[known])
+        n = points.normal[corner][:, None]
+        change -= n * np.einsum("pkai,pkai->pka", n + np.zeros_like(change), change)[..., None]
+        length = np.linalg.norm(total, axis=1)[corner]
+        change /= np.where(length > 0.0, length, 1.0)[:, None, :, None]
+        used = np.broadcast_to(known[:, None, :, None], change.shape)
+        row = np.broadcast_to((3 * corner[:, :, None] + np.arange(3))[:, None], change.shape)
+        column = np.broadcast_to(self.column[:, :, None, None], change.shape)
+        shape = (3 * count, self._size)
+        return csr_array(coo_array((change[used], (row[used], column[used])), shape=shape))
+
+    def _facet_normals(self) -> tuple[Array, Array]:
+        """Unit normals of the slave facets (P, 3), and their derivatives by the corners' coordinates (P, 12, 3)."""
+        a, b, c, d = (self._at[:, k] for k in range(4))
+        vector = 0.5 * np.cross(c - a, d - b)
+        size = np.linalg.norm(vector, axis=1)
+        normal = vector / size[:, None]
+        along, across = cross_matrix(c - a), cross_matrix(d - b)
+        each = 0.5 * np.stack([across, -along, -across, along], axis=1)  # pair, corner, 3, 3
+        plane = (np.eye(3) - normal[:, :, None] * normal[:, None, :]) / size[:, None, None]
+        return normal, np.einsum("pij,pcjk->pcki", plane, each).reshape(-1, 12, 3)
