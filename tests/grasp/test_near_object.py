@@ -55,6 +55,26 @@ def test_the_least_of_many_is_the_least_by_brute_force(name: str) -> None:
     np.testing.assert_array_equal(near.least(clouds[2:]), NearObject(thing).least(clouds)[2:])
 
 
+def test_points_that_may_meet_an_object_are_all_those_that_do() -> None:
+    thing = glass().placed((0.2, 0.1, -0.3), (0.1, 0.2, 0.3, 0.9))
+    points, way = thing.place.apply(cloud(thing, 400))[0], np.array([0.48, -0.6, 0.64])
+    near = NearObject(thing)
+    met = near.met(points, way, 1e-3)
+    path = points[:, None] + np.linspace(0.0, 0.5, 60)[:, None] * way
+    low, high = thing.vertices.min(axis=0) - 1e-3, thing.vertices.max(axis=0) + 1e-3
+    local = thing.place.to_local(path.reshape(-1, 3))[0]
+    passes = ((local >= low) & (local <= high)).all(axis=1).reshape(path.shape[:2]).any(axis=1)
+    assert met[passes].all()
+    assert 50 < np.count_nonzero(~met) < 350
+    # along a side of the box, outside it and inside
+    still = near.met(
+        thing.place.apply([[0.5, 0.0, 0.0], [0.0, 0.0, 0.0]])[0],
+        thing.place.apply([[0, 1, 0]])[0, 0] - thing.place.position[0],
+        0.0,
+    )
+    assert still.tolist() == [False, True]
+
+
 def test_each_part_has_its_own() -> None:
     import warp as wp
 
