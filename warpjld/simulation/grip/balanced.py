@@ -33,9 +33,9 @@ __all__ = ["BalancedGrip", "balanced_grip", "opposed_scales", "with_balance"]
 
 Array = NDArray[np.float64]
 
-_LEAST, _MOST = 0.25, 10.0
+_LEAST, _MOST = 0.1, 10.0
 """Bounds of the factor on a digit's force over that of all: beyond them directions and places of the forces are not
-known, and a digit that should hardly press takes many trials."""
+known. With a lower bound of 0.25, an index finger on a box pressed more than it should and slid with all of its skin."""
 _RELUCTANCE = 0.05
 """Weight of keeping a digit's force, over that of balance."""
 _TOTAL = 30.0
