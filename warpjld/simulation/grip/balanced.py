@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 _LEAST, _MOST = 0.1, 10.0
 """Bounds of the factor on a digit's force over that of all: beyond them directions and places of the forces are not
-known. With a lower bound of 0.25, an index finger on a box pressed more than it should and slid with all of its skin."""
+known. With a lower bound of 0.25 an index finger pressed a box more than it should, and slid with all of its skin."""
 _RELUCTANCE = 0.05
 """Weight of keeping a digit's force, over that of balance."""
 _TOTAL = 30.0
