@@ -39,12 +39,11 @@ class DigitSqueeze:
         joints: Digit, as in its efforts → indices of the joints that flex.
         after: Initial equilibrium.
         limits: Digit → force limit that differs from the default [N].
-        wanted: Force of each digit of which its share is measured [N], shape (D,); by default shares are those of its
-            muscles.
 
     Attributes:
         digits: Names of the digits that close, in the order of all arrays.
         joints: Joints of each.
+        wanted: Force of each digit of which its share is measured [N], shape (D,); None: shares are those of muscles.
         solved: Equilibria solved so far, beside the initial one.
     """
 
@@ -56,10 +55,9 @@ class DigitSqueeze:
         joints: Mapping[str, Sequence[int]],
         after: ContactSolution,
         limits: Mapping[str, float] | None = None,
-        wanted: Array | None = None,
     ) -> None:
         self._model, self._history, self._hand, self._limits = model, history, hand, limits
-        self._wanted = wanted
+        self.wanted: Array | None = None
         self.digits, self.joints = tuple(joints), [list(one) for one in joints.values()]
         self._start, self._time = hand.bones.angles(after.last.time), after.last.time
         self._bounds = hand.bones.skeleton.limits[:, FLEXION]
@@ -91,8 +89,8 @@ class DigitSqueeze:
         effort = self.effort(grips, closed.last)
         mine = [effort[digit] for digit in self.digits]
         forces, shares = (np.array([getattr(one, name) for one in mine]) for name in ("force", "share"))
-        if self._wanted is not None:
-            shares = forces / self._wanted
+        if self.wanted is not None:
+            shares = forces / self.wanted
         return PressedDigits(forces, shares, self._slopes(grips, closed, effort) if closed.last.touches else None)
 
     def effort(self, grips: Array, instant: ContactInstant) -> Effort:
@@ -147,8 +145,8 @@ class DigitSqueeze:
 
                 found = efforts.slopes(response, change, pose)
                 each = [found[effort[digit].digit] for digit in self.digits]
-                if self._wanted is not None:
-                    out[:, j] = np.array([one.force for one in each]) / self._wanted
+                if self.wanted is not None:
+                    out[:, j] = np.array([one.force for one in each]) / self.wanted
                 else:
                     out[:, j] = [one.shares[k] for one, k in zip(each, largest, strict=True)]
         except SensitivityError:
