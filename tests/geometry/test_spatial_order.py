@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from warpjld.grasp.space_order import along_curve
+from warpjld.geometry.spatial_order import spatial_order
 
 
 def test_neighbours_on_the_curve_are_near() -> None:
     points = np.random.default_rng(0).uniform(-0.1, 0.1, size=(4096, 3)).astype(np.float32)
-    order = along_curve(points)
+    order = spatial_order(points)
     np.testing.assert_array_equal(np.sort(order), np.arange(len(points)))
     step = np.median(np.linalg.norm(np.diff(points[order], axis=0), axis=1))
     # sixteen points along a side of the cube, 12.5 mm apart
@@ -15,4 +15,4 @@ def test_neighbours_on_the_curve_are_near() -> None:
 
 
 def test_points_in_one_place() -> None:
-    assert along_curve(np.zeros((3, 3))).tolist() == [0, 1, 2]
+    assert spatial_order(np.zeros((3, 3))).tolist() == [0, 1, 2]
