@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.finger import finger
 from warpjld.cli import main
@@ -89,6 +91,11 @@ def test_brackets(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="arithmetic: 201 levels; the limit is 200"):
         _run("RATE " + "(" + "1 + " * 400 + "1)", tmp_path)
     assert nesting(rb'{"a[[[": [1, [2]], "b\"[[": "\\[" }') == 3
+
+
+@given(st.text(alphabet='[{]}"\\a').map(str.encode), st.integers(1, 7))
+def test_nesting_does_not_depend_on_the_pieces_of_a_text(text: bytes, size: int) -> None:
+    assert nesting(text[at : at + size] for at in range(0, len(text), size)) == nesting(text)
 
 
 def test_a_mesh_of_hundred_thousand_layers(tmp_path: Path) -> None:

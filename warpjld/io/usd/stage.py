@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.files.archive import check_archive
-from warpjld.files.input_file import read_bytes
+from warpjld.files.input_file import open_input, read_bytes
 from warpjld.files.nesting import nesting
 from warpjld.io.usd.crate import MAGIC, check_crate
 from warpjld.limits import check_limit
 
 __all__ = ["UsdFile", "check_usd_content", "open_usd", "usd_matrices"]
 
+_PIECE = 1 << 20  # bytes of a text that are looked at together
 _MOST_WARNINGS = 5  # largest number of OpenUSD's warnings that are passed on
 _PLACE = re.compile(r"^Error in '[^']*' at line \d+ in file \S+ : '(.*?)'?$")
 
@@ -57,10 +58,14 @@ class UsdFile:
 
 def check_usd_content(path: Path) -> None:
     """Reject content that OpenUSD would take very long to reject, or would unpack without limit."""
+    with open_input(path) as file:
+        if file.read(5) == b"#usda":
+            check_limit(
+                "depth", nesting(iter(lambda: file.read(_PIECE), b""), b"[{(", b"]})"), of="brackets", path=path
+            )
+            return
     raw = read_bytes(path)
-    if raw.startswith(b"#usda"):
-        check_limit("depth", nesting(raw, b"[{(", b"]})"), of="brackets", path=path)
-    elif raw.startswith(b"PK"):
+    if raw.startswith(b"PK"):
         check_archive(path, "USD package (.usdz)")
         with zipfile.ZipFile(path) as package:
             for name in package.namelist():
