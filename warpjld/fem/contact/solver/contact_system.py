@@ -14,6 +14,7 @@ from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.fem.contact.law.multipliers import update_multipliers
 from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping
 from warpjld.fem.contact.solver.tangent import friction_coupling, linearise_mortar
+from warpjld.fem.load.inertia import Inertia
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 
@@ -50,6 +51,7 @@ class LoadStep:
         prescribed: Dirichlet conditions at ``time``.
         loads: Loads at ``time``.
         allowed: Fraction of the initial overlap that is still admissible at ``time``.
+        inertia: Inertia in an implicit Euler step of that length; None: a quasi-static step.
     """
 
     before: float
@@ -57,6 +59,7 @@ class LoadStep:
     prescribed: Prescribed
     loads: Loads
     allowed: float
+    inertia: Inertia | None = None
 
 
 @dataclass(frozen=True, eq=False)
