@@ -20,10 +20,12 @@ class Bond:
     Attributes:
         normal: Tensile strength [Pa].
         shear: Shear strength [Pa].
+        parted: Whether it has failed already at each site of the slave surface, shape (s,); empty: nowhere.
     """
 
     normal: float = np.inf
     shear: float = np.inf
+    parted: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         for name, value in (("normal", self.normal), ("shear", self.shear)):

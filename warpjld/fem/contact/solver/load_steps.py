@@ -233,10 +233,10 @@ class LoadSteps:
         share = self.passing.share(self.u, ahead, step.before, step.time)
         if share < _WHOLE and may_cut and not guess_jumps(share, cut):
             return share, share
+        if step.inertia is not None:
+            return 1.0, cut
         motion = (self.body.mesh.nodes, self.u, ahead)
         self.states = touched_at(self.interfaces, self.states, *motion, step)
-        if step.inertia is not None:
-            return 1.0, cut  # steps that resolve the motion resolve when friction begins
         share = first_touch(self.interfaces, self.states, *motion, step)
         return share if _TOUCHING < share < _WHOLE and may_cut else 1.0, cut
 

@@ -114,7 +114,7 @@ class NewtonState:
         self.elastic, self.system, self.step, self.start = elastic, system, step, start
         self._tolerance, self._penetration = tolerance, penetration
         self.free = step.prescribed.free(len(start))
-        self.states = self._before = system.begun(states, start, step.before)
+        self.states = self._before = system.begun(states, start, step)
         self.jump = np.zeros_like(start)
         self._pressures: Array | None = None
         self._iteration, self._settled, self._same_for, self._stumbles = -1, False, 0, 0
