@@ -38,7 +38,9 @@ _LONGEST = 10
 """Longest impact, in times of a wave to and fro: a body that still rolls or tips over goes on as a rigid one."""
 _REST = 2.0
 """Impulse of contact over that of the weight at which an impact is over."""
-_TOLERANCE = 1e-6
+_HALVINGS = 2
+"""Most successive halvings of a step before friction is left out."""
+_TOLERANCE = 1e-4
 """Residual over the forces in balance, which is what the momentum of contact and bodies may differ by in a step."""
 
 
@@ -85,6 +87,7 @@ def solve_impact(
     run = _Run(model, bodies, rate, _passage(bodies, contact))
     if failure := run.solve():
         return failure
+    assert run.found is not None
     kept, openings = [], []
     share = {}
     for k, bond in bonds:
@@ -93,11 +96,14 @@ def solve_impact(
         share[k] = float(state.bonded[made].mean())
         if share[k] > 0.0:
             kept.append(replace(bond, parted=tuple((~state.bonded).tolist()) if share[k] < 1.0 else bond.parted))
-        if k in run.opened:
+        if share[k] < 1.0:
             how = "opens" if share[k] == 0.0 else f"opens in part ({100.0 * share[k]:.0f} % of it still holds)"
             names = " and ".join((bond.one, bond.other))
             on = f"on impact on {' and '.join(strike.on)} at {strike.speed:.2g} m/s"
             openings.append(f"the bond of {names} {how} at frame {start + run.opened[k]:.5g}, {on}")
+    if run.smooth is not None:
+        what = f"the impact on {' and '.join(strike.on)} at frame {start:.5g}"
+        openings.append(f"{what} is solved without friction from frame {start + run.smooth:.5g} on")
     return Impact(start + run.time, run.bodies(kept), kept, tuple(openings), run.paths())
 
 
@@ -121,6 +127,8 @@ def _model(
     )
     objects = [build_object_body(animation.objects[name], own, start, part.place) for name, part in parts.items()]
     model = assemble_model([], objects, obstacles, own, start=start, animation=animation)
+    pairs = tuple(replace(pair, elastic=pair.bond is not None) for pair in model.pairs)
+    model = replace(model, pairs=pairs)
     sides = [{owner.slave, owner.master} for owner in model.owners]
     return model, [(sides.index({bond.one, bond.other}), bond) for bond in bonds]
 
@@ -142,13 +150,14 @@ class _Run:
         found: Last solution.
         time: Time reached.
         opened: Time at which each bond opens for the first time, wholly if it does, by number of its pair.
+        smooth: Time from which on there is no friction; None: it acts all the time.
     """
-
-    found: ContactSolution
 
     def __init__(self, model: ContactModel, bodies: Sequence[RigidBody], rate: float, passage: float) -> None:
         self._model, self._rate, self._passage = model, rate, passage
-        self._x = model.body.mesh.nodes
+        self._x, self._pairs = model.body.mesh.nodes, list(model.pairs)
+        self.found: ContactSolution | None = None
+        self.smooth: float | None = None
         self._masses = lumped_masses(model.body)
         self._velocity = np.zeros_like(self._x)
         body_of = {}
@@ -168,34 +177,49 @@ class _Run:
         """Solve until the impact is over; the reason in words where that fails."""
         step = self._passage / _PARTS * self._rate  # [frames]
         weight = float(self._masses.sum() * np.linalg.norm(self._model.loads.gravity))
-        after, began, count = None, False, _PARTS // 2
+        began, count = False, _PARTS // 2
         for _ in range(2 * _LONGEST):
             times = [self.time + (k + 1) * step for k in range(count)]
-            found = press(
-                self._model.body,
-                lambda time: Prescribed(np.empty(0, np.int64), np.empty(0)),
-                self._model.pairs,
-                lambda time: self._model.loads,
-                times=times,
-                after=after,
-                tolerance=_TOLERANCE,
-                dynamics=Dynamics(self._velocity, 1.0 / self._rate),
-                check=False,
-            )
+            found = self._pressed_on(times)
+            if not found.converged and self.smooth is None:
+                self._drop_friction()
+                found = self._pressed_on(times)
             if not found.converged:
                 return found.message
             self._note(found)
-            self.found = after = found
-            self.time = times[-1]
+            self.found, self.time = found, times[-1]
             assert found.last.velocity is not None
             self._velocity = found.last.velocity
-            given = sum(self._pressed(instant) for instant in found.instants) / count
+            given = sum(self._push(instant) for instant in found.instants) / count
             if began and given < _REST * weight:
                 break
             began = began or given >= _REST * weight
         return ""
 
-    def _pressed(self, instant: ContactInstant) -> float:
+    def _pressed_on(self, times: list[float]) -> ContactSolution:
+        """Solve on to some times."""
+        return press(
+            self._model.body,
+            lambda time: Prescribed(np.empty(0, np.int64), np.empty(0)),
+            self._pairs,
+            lambda time: self._model.loads,
+            times=times,
+            after=self.found,
+            tolerance=_TOLERANCE,
+            dynamics=Dynamics(self._velocity, 1.0 / self._rate),
+            halvings=_HALVINGS,
+            check=False,
+        )
+
+    def _drop_friction(self) -> None:
+        """Go on without friction: where bonded sides meet a third in a corner, how it acts is not always found."""
+        self.smooth = self.time
+        self._pairs = [replace(pair, friction=0.0) for pair in self._pairs]
+        if self.found is not None:
+            states = [replace(s, friction=s.friction * s.bonded[:, None]) for s in self.found.states]
+            self.found = replace(self.found, states=tuple(states))
+
+    def _push(self, instant: ContactInstant) -> float:
         """Contact forces on the bodies, from without and of each other [N]."""
         pairs = zip(instant.touches, self._outer, strict=True)
         return sum(float(np.linalg.norm(touch.force)) for touch, outer in pairs if outer)
@@ -232,6 +256,7 @@ class _Run:
 
     def bodies(self, bonds: Sequence[BondStrength]) -> list[RigidBody]:
         """Rigid bodies at the end, with the momentum and angular momentum of the finite elements."""
+        assert self.found is not None
         u = self.found.last.displacement
         out = []
         for names in bonded_groups(self._parts, bonds):

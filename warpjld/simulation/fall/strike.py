@@ -2,9 +2,9 @@
 
 At rest, a contact closes by g h in a step of length h, the speed that gravity gives meanwhile, and a strike slower than
 another g h cannot be told from it. A strike at speed v passes waves of stress ρ c v on (Johnson 1985, §11.1), with
-c = √(E/ρ); bending waves in beams of rectangular section have √3 times that (Cremer, Heckl & Ungar 1973, Structure-borne
-Sound, §II.3), and twice as much where they are reflected. Strikes whose waves stay below the strength of every bond land
-rigidly.
+c = √(E/ρ); bending waves in beams of rectangular section have √3 times that (Cremer, Heckl & Ungar 1973,
+Structure-borne Sound, §II.3), and twice as much where they are reflected. Strikes whose waves stay below the strength
+of every bond land rigidly.
 """
 
 from __future__ import annotations

@@ -70,6 +70,9 @@ class Pair:
             takes more iterations and resolves obstacles with edges or tips smaller than a face.
         offset: Height of the touching surface above the mesh at every node of the body [m], shape (N,): a glove, or a
             skin finer than the elements. Gaps are measured from there.
+        elastic: Whether contact and bonds give way as an elastic layer of 1/200 of an edge would, not rigid ones.
+            Where two bonded sides meet a third in a corner, rigid constraints would be redundant, and their tractions
+            indeterminate. For solves with inertia: friction keeps nothing from one step to the next.
     """
 
     slave: str | Ints32
@@ -80,6 +83,7 @@ class Pair:
     bond: Bond | None = None
     sites: str = "nodes"
     offset: Array | None = None
+    elastic: bool = False
 
     def __post_init__(self) -> None:
         if not (self.friction >= 0.0 and np.isfinite(self.friction)):

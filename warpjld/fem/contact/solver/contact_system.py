@@ -11,7 +11,7 @@ from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
-from warpjld.fem.contact.law.multipliers import update_multipliers
+from warpjld.fem.contact.law.multipliers import elastic_multipliers, update_multipliers
 from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping
 from warpjld.fem.contact.solver.tangent import friction_coupling, linearise_mortar
 from warpjld.fem.load.inertia import Inertia
@@ -219,15 +219,19 @@ class ContactSystem:
         predicted: list[ContactTractions],
         move: Array,
         decides: ActiveSet,
+        *,
+        ended: bool = False,
     ) -> list[ContactState]:
-        """Contact states after a move (3N,) with predicted tractions (multiplier update)."""
+        """Contact states after a move (3N,) with predicted tractions (multiplier update); ``ended``: of a step."""
         out = []
         for k, (slip, s, p, t) in enumerate(
             zip(self._slips(contact, move), states, contact.points, predicted, strict=True)
         ):
             now, penalty = contact.tractions[k], self._penalty(k, p, s)
-            s = update_multipliers(self.interfaces[k].pair, s, p, t, slip, penalty, now.active, decides)
-            out.append(replace(s, stiffening=self._stiffer(k, s, p, now, t)))
+            pair = self.interfaces[k].pair
+            new = update_multipliers(pair, s, p, t, slip, penalty, now.active, decides)
+            new = elastic_multipliers(pair, s, new, ended=ended)
+            out.append(replace(new, stiffening=self._stiffer(k, new, p, now, t)))
         return out
 
     def _stiffer(
@@ -282,6 +286,8 @@ class ContactSystem:
             deepest = max(deepest, float((t.error / self.interfaces[k].edge[p.sites]).max()))
             if deepest > self._penetration:
                 return False
+            if self.interfaces[k].pair.elastic:
+                continue
             pressure, friction = t.pressure - s.pressure[p.sites], t.friction - s.friction[p.sites]
             change = p.area @ (np.abs(pressure) + np.linalg.norm(friction, axis=1))
             size = float(p.area @ (np.abs(t.pressure) + np.linalg.norm(t.friction, axis=1)))

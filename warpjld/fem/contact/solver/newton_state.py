@@ -227,7 +227,7 @@ class NewtonState:
         """The equilibrium at u, with contact states for the next step."""
         contact = self.contact
         zero = np.zeros_like(self.u)
-        kept = self.system.updated(self.states, contact, contact.tractions, zero, ActiveSet.TRIAL)
+        kept = self.system.updated(self.states, contact, contact.tractions, zero, ActiveSet.TRIAL, ended=True)
         left = 1.0 if self.step.allowed > 0.0 else 0.0  # once removed, initial overlaps are no longer admissible
         kept = [replace(s, slip_anchor=np.zeros_like(s.slip_anchor), allowance=left * s.allowance) for s in kept]
         # sliding before contact began is not slip
