@@ -126,7 +126,8 @@ def drop(things: dict[str, RecordedObject], last: int, friction: float = 0.5) ->
     name = next(iter(things))
     contact = ContactSpecification(physical={name: ObjectMaterial()}, everywhere=friction, gravity=tuple(G))
     request = SolveSpecification(0, last)
-    return follow_falls(RecordedAnimation(objects=things.values()), contact, request, falling_names(contact, request))
+    animation = RecordedAnimation(objects=things.values())
+    return follow_falls(animation, contact, request, falling_names(contact, request)).paths
 
 
 def test_a_ball_dropped_into_a_bowl_rests_at_its_bottom() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.meshes import Keyframed
 from warpjld.simulation.animation import Animation
+from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 from warpjld.simulation.bodies.skin_obstacle import SkinObstacle
 from warpjld.simulation.fall.contact_points import RigidContact
 from warpjld.simulation.fall.fall_path import FallPath
@@ -181,7 +183,11 @@ class FallingStage:
         """An obstacle of the stage with its times from another frame."""
         if name in self.animation.actors:
             return SkinObstacle(self.animation.actors[name], start)
-        return solid if name in self.paths else self.animation.objects[name].obstacle(start)
+        if name not in self.animation.objects or name in self.paths:
+            return solid
+        one = self.animation.objects[name]
+        # an impact asks for the same times again and again
+        return rigid_obstacle(one.thing, lru_cache(maxsize=8)(placed_motion(one.place, start)))
 
     def _note(self, body: RigidBody, frame: float, length: float) -> None:
         """Update whether a body is at rest: slow for long enough, which it cannot be in the air."""

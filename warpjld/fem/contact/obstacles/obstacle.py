@@ -69,14 +69,6 @@ class Moving(Obstacle):
     """An obstacle with a rigid ``motion``, and a shape in its own frame that may be a function of time."""
 
     motion: RigidMotion | None
-    _placed: tuple[RigidMotion | None, float, tuple[Array, Array]] | None = None
-
-    def _placement(self, time: float) -> tuple[Array, Array]:
-        """Rotation matrix (3, 3) and translation (3,) [m] at a time; that of the last time is kept."""
-        known = self._placed
-        if known is None or known[0] is not self.motion or known[1] != time:
-            known = self._placed = self.motion, time, placement(self.motion, time)
-        return known[2]
 
     @abstractmethod
     def _project(self, points: Points, time: float) -> ClosestPoints:
@@ -93,7 +85,7 @@ class Moving(Obstacle):
     def project(self, points: Points, time: float) -> ClosestPoints:
         """See `Obstacle.project`."""
         points = checked_points(points)
-        turn, shift = self._placement(time)
+        turn, shift = placement(self.motion, time)
         found = self._project((points - shift) @ turn, time)
         return ClosestPoints(found.distance, found.closest @ turn.T + shift, found.normal @ turn.T)
 
