@@ -202,6 +202,14 @@ def test_objects_alone_fall(tmp_path) -> None:
 
 
 @pytest.mark.slow
+def test_a_bar_falls_apart(tmp_path) -> None:
+    verdict = run_small("falls_apart.jld", tmp_path)["press"]["verdict"]
+    assert "the bond of BAR_1 and BAR_2 opens at frame 6." in verdict
+    assert "on impact on EDGE at 2 m/s" in verdict
+    assert verdict.count("comes to rest on FLOOR") == 2
+
+
+@pytest.mark.slow
 def test_holding_a_ball_as_gently_as_can_be(tmp_path) -> None:
     summary = run_small("hold_ball.jld", tmp_path, frames=(41, 44))
     assert summary["press"]["status"] == "CONVERGED"

@@ -10,6 +10,7 @@ Examples:
 """
 
 from warpjld.fem.body import Body
+from warpjld.fem.load.inertia import Dynamics
 from warpjld.fem.load.loads import Centrifugal, Loads
 from warpjld.fem.load.prescribed import FreeBodyError, Prescribed, prescribe
 from warpjld.fem.material.materials import Fung, LinearElastic, Material, MaterialWarning, MooneyRivlin, NeoHooke
@@ -22,6 +23,7 @@ from warpjld.fem.solver.static import solve
 __all__ = [
     "Body",
     "Centrifugal",
+    "Dynamics",
     "FreeBodyError",
     "Fung",
     "HexMesh",

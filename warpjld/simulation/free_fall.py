@@ -9,6 +9,7 @@ from warpjld.fem import SolveStatus
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.fall.fall_path import fall_summaries
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.fallen import (
     FallenAnimation,
@@ -21,7 +22,7 @@ from warpjld.simulation.solve.fallen import (
 from warpjld.simulation.solve.falling import falling_names, follow_falls
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
 from warpjld.simulation.solve_result import SolveResult
-from warpjld.simulation.specification import ContactSpecification, SolveSpecification
+from warpjld.simulation.specification import BondStrength, ContactSpecification, SolveSpecification
 
 __all__ = ["after_contact", "before_contact", "rests_rigidly"]
 
@@ -42,7 +43,8 @@ def before_contact(
     names = falling_names(specification, request)
     if not names:
         return specification, animation, find_start(animation, specification, request)
-    paths = follow_falls(animation, specification, request, names)
+    found = follow_falls(animation, specification, request, names)
+    paths, specification = found.paths, replace(specification, bonds=found.bonds)
     start = fallen_start(paths, float(request.first), float(request.last))
     stage, others = FallenAnimation(animation, paths), without(specification, names)
     before = StartFrame(start, {})
@@ -53,7 +55,8 @@ def before_contact(
     outside = [name for name in names if name not in inside]
     if outside and not (inside or others.flesh or others.physical):
         inside, outside = names, []  # nothing else deforms, and no frame is left to solve
-    return without(specification, outside), stage, moved_by(paths, before, inside)
+    moved = moved_by(paths, before, inside)
+    return without(specification, outside), stage, replace(moved, falls=(*moved.falls, *found.openings))
 
 
 def after_contact(
@@ -67,20 +70,31 @@ def after_contact(
     weights = any(specification.pull) and request.method != "paper"
     if solved.status not in (SolveStatus.UNHELD, SolveStatus.SLIDING) or not weights or solved.model.animation is None:
         return before, solved
-    bodies = released_bodies(solved.model, solved.frames, specification, request.rate)
+    first = solved.frames[-1].frame if solved.frames else solved.start
+    held = _bonds_left(solved, specification)
+    bodies = released_bodies(solved.model, solved.frames, replace(specification, bonds=held), request.rate)
     if not bodies:
         return before, solved
-    first = solved.frames[-1].frame if solved.frames else solved.start
-    known = (solved.model.animation, specification, request, list(bodies))
-    paths = follow_falls(*known, released=bodies, first=first)
+    known = (solved.model.animation, replace(specification, bonds=held), request, list(bodies))
+    found = follow_falls(*known, released=bodies, first=first)
+    paths = found.paths
     if not any(path.summary() for path in paths.values()):
         return before, solved
     moved = dict(before.moved)
     for name, path in paths.items():
         frames, places = moved.get(name, ([], []))
         moved[name] = ([*frames, *path.frames], [*places, *path.places])
-    falls = tuple(text for path in paths.values() if (text := path.summary()))
-    return replace(before, moved=moved, falls=(*before.falls, *falls)), replace(solved, released=first)
+    falls = (*before.falls, *fall_summaries(paths.values()), *found.openings)
+    return replace(before, moved=moved, falls=falls), replace(solved, released=first)
+
+
+def _bonds_left(solved: SolveResult, specification: ContactSpecification) -> list[BondStrength]:
+    """Bonds that hold at the last solved frame, wholly or in part."""
+    if not solved.frames:
+        return specification.bonds
+    shares = zip(solved.model.owners, solved.frames[-1].bonded, strict=True)
+    parted = [{owner.slave, owner.master} for owner, share in shares if share == 0.0]
+    return [bond for bond in specification.bonds if {bond.one, bond.other} not in parted]
 
 
 def rests_rigidly(model: ContactModel, before: StartFrame, frames: Sequence[float]) -> str:

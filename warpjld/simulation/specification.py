@@ -89,6 +89,7 @@ class BondStrength:
     Attributes:
         one, other: Names of the objects.
         normal, shear: Tensile and shear strength of the bond [Pa].
+        parted: Points of the softer side at which it has opened already (``fem.contact.Bond``); empty for none.
         where: Script location, for messages.
     """
 
@@ -97,6 +98,7 @@ class BondStrength:
     normal: float
     shear: float
     where: SourceLocation | None = None
+    parted: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True)

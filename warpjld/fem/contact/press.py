@@ -14,6 +14,7 @@ from warpjld.fem.contact.paper.loop import by_turns
 from warpjld.fem.contact.results.contact_solution import ContactError, ContactInstant, ContactSolution, ContactWarning
 from warpjld.fem.contact.solver.load_steps import Guess, LoadSteps
 from warpjld.fem.contact.solver.unresolved import unresolved
+from warpjld.fem.load.inertia import Dynamics
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 from warpjld.fem.rotation import warn_of_rotation
@@ -41,9 +42,10 @@ def press(
     halvings: int | None = None,
     solves: int | None = None,
     check: bool = True,
+    dynamics: Dynamics | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ContactSolution:
-    """Equilibria of bodies in contact at ascending times.
+    """Equilibria of bodies in contact at ascending times, or their motion with inertia.
 
     Initial overlaps are removed gradually up to the first time (R112). Load steps that fail are halved; steps longer
     than contact search can follow, and steps in which frictional contact begins, are cut. Bodies that would pass
@@ -68,6 +70,8 @@ def press(
         solves: Most linear solves of the run, after which it ends with ``SolveStatus.EXHAUSTED``; by default only those
             in vain are bounded, for each time. Not used by ``paper``.
         check: Whether to raise if the last time is not reached, instead of returning the status.
+        dynamics: Motion at the start: bodies then move with inertia, by implicit Euler steps between the times
+            (``fem.load.inertia``), and instants have velocities. Not with ``paper``.
         progress: Called with a line of text after each instant.
 
     Raises:
@@ -85,11 +89,13 @@ def press(
     for name, most in (("halvings", halvings), ("solves", solves)):
         if most is not None and most < 0:
             raise InputError(f"{name}: want 0 or more, got {most}")
+    if method == "paper" and dynamics is not None:
+        raise InputError("dynamics: the paper's loop knows no inertia; want the method augmented")
     if method == "paper":
         solution = by_turns(body, prescribed, pairs, loads, wanted, after, aitken, penetration, guess, watch, progress)
     else:
         known = (body, prescribed, list(pairs), loads, wanted, after, tolerance, penetration, guess)
-        steps = LoadSteps(*known, halvings, solves)
+        steps = LoadSteps(*known, halvings, solves, dynamics)
         solution = steps.run(watch, progress)
         last = solution.last
         sides = (body.mesh.nodes, steps.interfaces, steps.moduli, steps.passing)

@@ -243,7 +243,7 @@ def _pairs(
     for k, one in enumerate(bodies):
         for other in bodies[k + 1 :]:
             bonded = contact.bond(one.name, other.name)
-            bond = None if bonded is None else Bond(normal=bonded.normal, shear=bonded.shear)
+            bond = None if bonded is None else Bond(bonded.normal, bonded.shear, bonded.parted)
             slave, master = (one, other) if one.modulus <= other.modulus and not paper else (other, one)
             friction, title = contact.coefficient(one.name, other.name), f"{slave.name}–{master.name}"
             pairs.append(Pair(slave.faces, master.faces, friction, title, bond=bond))

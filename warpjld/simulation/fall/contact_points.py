@@ -37,7 +37,10 @@ class RigidContact:
         gap: Signed distance [m]; negative: overlap.
         carried: Velocity of the obstacle's surface there [m/s], shape (3,); 0 for bodies.
         friction: Coulomb's μ.
-        name: Name of the other body or obstacle.
+        own: Name of the object that touches.
+        name: Name of the other object or obstacle.
+        closing: Speed at which the sides approach along the normal before the impulses of a step [m/s]; gravity
+            included.
     """
 
     body: int
@@ -47,7 +50,9 @@ class RigidContact:
     gap: float
     carried: NDArray[np.float64]
     friction: float
+    own: str
     name: str
+    closing: float = 0.0
 
     @property
     def axes(self) -> NDArray[np.float64]:
@@ -75,11 +80,11 @@ def contacts_with(
     friction: Callable[[str, str], float],
     shapes: Mapping[str, NDArray[np.float64]],
 ) -> list[RigidContact]:
-    """Contact points of a body with obstacles that are closer than a margin.
+    """Contact points of a body, or a part of it, with obstacles that are closer than a margin.
 
     Args:
         number: Index of the body.
-        body: The body.
+        body: The body, or one of its parts.
         obstacles: Obstacles by name.
         time: Time at the begin of the step [frames].
         step: Length of the step [frames].
@@ -99,7 +104,8 @@ def contacts_with(
             carried = (after - points) / length
             mu = friction(body.shape.name, name)
             rows = zip(points, normals, gaps, carried, strict=True)
-            out += [RigidContact(number, -1, p, n, float(g), c, mu, name) for p, n, g, c in rows]
+            own = body.shape.name
+            out += [RigidContact(number, -1, p, n, float(g), c, mu, own, name) for p, n, g, c in rows]
     return out
 
 
@@ -108,9 +114,11 @@ def contacts_within(
 ) -> list[RigidContact]:
     """Contact points between bodies that are closer than a margin [m]."""
     out = []
-    for k, one in enumerate(bodies):
-        for m in range(k + 1, len(bodies)):
-            other = bodies[m]
+    parts = [(k, part) for k, body in enumerate(bodies) for part in body.parts]
+    for i, (k, one) in enumerate(parts):
+        for m, other in parts[i + 1 :]:
+            if k == m:
+                continue
             if np.linalg.norm(one.centre - other.centre) > one.shape.reach + other.shape.reach + margin:
                 continue
             sets = [_near(one, other.project, margin)]
@@ -120,7 +128,8 @@ def contacts_within(
             mu, still = friction(one.shape.name, other.shape.name), np.zeros(3)
             for points, normals, gaps in _sides(sets):
                 rows = zip(points, normals, gaps, strict=True)
-                out += [RigidContact(k, m, p, n, float(g), still, mu, other.shape.name) for p, n, g in rows]
+                names = one.shape.name, other.shape.name
+                out += [RigidContact(k, m, p, n, float(g), still, mu, *names) for p, n, g in rows]
     return out
 
 

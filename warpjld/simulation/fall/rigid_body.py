@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,10 @@ from warpjld.fem.contact.obstacles.obstacle import ClosestPoints
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.simulation.specification import ObjectMaterial
 
-__all__ = ["RigidBody", "RigidShape", "rigid_shape"]
+__all__ = ["RigidBody", "RigidShape", "RigidState", "rigid_shape"]
+
+RigidState = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], tuple[str, ...]]
+"""Centre, rotation matrix, velocity, spin, and names of what presses on a body."""
 
 _ACROSS = 10.0
 """Surface points across an object's largest extent that are tested for contact."""
@@ -127,6 +131,20 @@ class RigidBody:
         self.velocity = np.zeros(3)
         self.spin = np.zeros(3)
         self.touching: tuple[str, ...] = ()
+
+    @property
+    def parts(self) -> Sequence[RigidBody]:
+        """Its objects, each with placement and velocity: itself."""
+        return (self,)
+
+    @property
+    def state(self) -> RigidState:
+        """Its state, from which ``restore`` returns it to this moment."""
+        return self.centre, self.turn, self.velocity, self.spin, self.touching
+
+    def restore(self, state: RigidState) -> None:
+        """Set an earlier state."""
+        self.centre, self.turn, self.velocity, self.spin, self.touching = state
 
     @property
     def place(self) -> Places:

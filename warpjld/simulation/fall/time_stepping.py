@@ -8,6 +8,7 @@ never increases unless an animated obstacle pushes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,7 +21,7 @@ from warpjld.simulation.fall.contact_points import RigidContact, contacts_with, 
 from warpjld.simulation.fall.impulses import impulses, jacobian
 from warpjld.simulation.fall.rigid_body import RigidBody
 
-__all__ = ["ROLLING", "step_bodies", "steps_of"]
+__all__ = ["ROLLING", "coast", "step_bodies", "steps_of"]
 
 ROLLING = 20.0
 """Rolling resistance α: decay rate of the spin of a body in contact [1/s]."""
@@ -38,6 +39,13 @@ _SLOP = 1e-5
 def steps_of(frames: float, rate: float) -> int:
     """Number of time steps for an interval in frames at a frame rate [1/s]."""
     return max(1, int(np.ceil(frames / rate / _LONGEST - 1e-9)))
+
+
+def coast(body: RigidBody, gravity: NDArray[np.float64], seconds: float) -> None:
+    """Advance a body without contact, in place, under the acceleration ``gravity`` (3,) [m/s²]."""
+    body.centre = body.centre + seconds * body.velocity + 0.5 * seconds**2 * gravity
+    body.velocity = body.velocity + seconds * gravity
+    body.turn = Rotation.from_rotvec(seconds * body.spin).as_matrix() @ body.turn
 
 
 def step_bodies(
@@ -74,11 +82,12 @@ def step_bodies(
     contacts = contacts_within(bodies, max(margins, default=0.0), friction)
     shapes = {name: _shape(obstacle, time) for name, obstacle in obstacles.items()}
     for k, one in enumerate(bodies):
-        contacts += contacts_with(k, one, obstacles, time, step, length, margins[k], friction, shapes)
+        for part in one.parts:
+            contacts += contacts_with(k, part, obstacles, time, step, length, margins[k], friction, shapes)
     pressed, parting = _impelled(bodies, contacts, length)
     for k, one in enumerate(bodies):
         mine = [c for c in pressed if k in (c.body, c.other)]
-        names = [c.name if c.body == k else bodies[c.body].shape.name for c in mine]
+        names = [c.name if c.body == k else c.own for c in mine]
         one.touching = tuple(dict.fromkeys(names))
         moved = length * (one.velocity + parting[k, :3])
         if not mine:
@@ -124,12 +133,14 @@ def _impelled(
     carried = np.concatenate([c.axes @ c.carried for c in contacts])
     gaps = np.array([c.gap - _SLOP for c in contacts])
     friction = np.array([c.friction for c in contacts])
-    found = impulses(delassus, rows @ velocity - carried, np.maximum(gaps, 0.0) / length, friction)
+    free = rows @ velocity - carried
+    found = impulses(delassus, free, np.maximum(gaps, 0.0) / length, friction)
     after = (velocity + moves @ found).reshape(-1, 6)
     for k, one in enumerate(bodies):
         one.velocity, one.spin = after[k, :3], after[k, 3:]
     if (gaps < 0.0).any():
         corrections = impulses(delassus, np.zeros(len(rows)), _PARTED * gaps / length, np.zeros(len(gaps)))
         parting = (moves @ corrections).reshape(-1, 6)
-    pressed = [c for c, p in zip(contacts, found[::3], strict=True) if p > 0.0]
+    known = zip(contacts, found[::3], free[::3], strict=True)
+    pressed = [replace(c, closing=-float(v)) for c, p, v in known if p > 0.0]
     return pressed, parting

@@ -16,8 +16,10 @@ from warpjld.simulation.animation import ActorAnimation, AngleEdit, Animation, O
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
+from warpjld.simulation.fall.bonded import bonded_groups
+from warpjld.simulation.fall.fall_path import FallPath, fall_summaries
 from warpjld.simulation.fall.rigid_body import RigidBody, rigid_shape
-from warpjld.simulation.solve.falling import FallPath
+from warpjld.simulation.fall.rigid_cluster import rigid_union
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.simulation.specification import ContactSpecification
 
@@ -81,9 +83,10 @@ def fallen_start(paths: Mapping[str, FallPath], first: float, last: float) -> fl
 
 
 def without(contact: ContactSpecification, names: Sequence[str]) -> ContactSpecification:
-    """A copy of the specification in which some objects do not deform."""
+    """A copy of the specification in which some objects do not deform, and have no bonds."""
     physical = {name: matter for name, matter in contact.physical.items() if name not in names}
-    return replace(contact, physical=physical)
+    bonds = [bond for bond in contact.bonds if bond.one not in names and bond.other not in names]
+    return replace(contact, physical=physical, bonds=bonds)
 
 
 def taking_part(paths: Mapping[str, FallPath], start: float) -> list[str]:
@@ -106,24 +109,32 @@ def released_bodies(
         contact: Specification with weights and bonds.
         rate: Frames per second.
     """
-    bonded = {name for bond in contact.bonds for name in (bond.one, bond.other)}
-    out = {}
-    now = frames[-1].frame if frames else model.start
+    now, placed = frames[-1].frame if frames else model.start, {}
     for one in model.objects:
         known = len(one.prescribed(now + _NEXT - model.start, History()).degrees)
-        if known or one.name in bonded or not contact.physical[one.name].density > 0.0 or model.animation is None:
+        if known or not contact.physical[one.name].density > 0.0 or model.animation is None:
             continue
-        thing = model.animation.objects[one.name].thing
         span = model.spans[one.name]
         shapes = [one.mesh.nodes + frame.displacement[span] for frame in frames[-2:]] or [one.mesh.nodes]
-        body = RigidBody(rigid_shape(one.name, thing, contact.physical[one.name]), _fitted(one.local, shapes[-1]))
-        if len(shapes) == 2:
+        shape = rigid_shape(one.name, model.animation.objects[one.name].thing, contact.physical[one.name])
+        placed[one.name] = shape, [_fitted(one.local, points) for points in shapes]
+    out: dict[str, RigidBody] = {}
+    for group in bonded_groups(contact.physical, contact.bonds):
+        if not placed.keys() >= set(group):
+            continue
+        body = rigid_union([(placed[name][0], placed[name][1][-1]) for name in group])
+        if len(frames) > 1:
             length = (frames[-1].frame - frames[-2].frame) / rate
-            before = RigidBody(body.shape, _fitted(one.local, shapes[0]))
+            before = rigid_union([(placed[name][0], placed[name][1][0]) for name in group])
             body.velocity = (body.centre - before.centre) / length
-            body.spin = Rotation.from_matrix(body.turn @ before.turn.T).as_rotvec() / length
-        out[one.name] = body
+            body.spin = _turned(placed[group[0]][1]).as_rotvec() / length
+        out |= dict.fromkeys(group, body)
     return out
+
+
+def _turned(places: Sequence[Places]) -> Rotation:
+    """Rotation from the first of several placements to the last."""
+    return Rotation.from_quat(places[-1].rotation[0]) * Rotation.from_quat(places[0].rotation[0]).inv()
 
 
 def _fitted(local: NDArray[np.float64], shape: NDArray[np.float64]) -> Places:
@@ -143,5 +154,4 @@ def moved_by(paths: Mapping[str, FallPath], before: StartFrame, inside: Sequence
         if name in inside:
             frames, places = [*frames, before.start], [*places, path.at(before.start)]
         moved[name] = (frames, places)
-    falls = tuple(text for path in paths.values() if (text := path.summary()))
-    return replace(before, moved=moved, falls=falls)
+    return replace(before, moved=moved, falls=tuple(fall_summaries(paths.values())))

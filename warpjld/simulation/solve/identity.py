@@ -45,7 +45,7 @@ def identity_of(model: ContactModel, contact: ContactSpecification, frames: Sequ
     for pair, owner in zip(model.pairs, model.owners, strict=True):
         two = " ".join(sorted((owner.slave, owner.master)))
         parts[f"FRICTION {two}"] = pair.friction
-        parts[f"BOND {two}"] = None if pair.bond is None else [pair.bond.normal, pair.bond.shear]
+        parts[f"BOND {two}"] = None if pair.bond is None else [pair.bond.normal, pair.bond.shear, *pair.bond.parted]
     out = {
         name: hashlib.sha256(json.dumps(value, default=_plain).encode()).hexdigest() for name, value in parts.items()
     }

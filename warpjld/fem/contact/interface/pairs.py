@@ -20,10 +20,12 @@ class Bond:
     Attributes:
         normal: Tensile strength [Pa].
         shear: Shear strength [Pa].
+        parted: Whether it has failed already at each site of the slave surface, shape (s,); empty: nowhere.
     """
 
     normal: float = np.inf
     shear: float = np.inf
+    parted: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         for name, value in (("normal", self.normal), ("shear", self.shear)):
@@ -68,6 +70,9 @@ class Pair:
             takes more iterations and resolves obstacles with edges or tips smaller than a face.
         offset: Height of the touching surface above the mesh at every node of the body [m], shape (N,): a glove, or a
             skin finer than the elements. Gaps are measured from there.
+        elastic: Whether contact and bonds give way as an elastic layer of 1/200 of an edge would, not rigid ones.
+            Where two bonded sides meet a third in a corner, rigid constraints would be redundant, and their tractions
+            indeterminate. For solves with inertia: friction keeps nothing from one step to the next.
     """
 
     slave: str | Ints32
@@ -78,6 +83,7 @@ class Pair:
     bond: Bond | None = None
     sites: str = "nodes"
     offset: Array | None = None
+    elastic: bool = False
 
     def __post_init__(self) -> None:
         if not (self.friction >= 0.0 and np.isfinite(self.friction)):

@@ -13,7 +13,7 @@ from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.fem.contact.law.return_mapping import FRICTION_FROM, ContactTractions
 from warpjld.geometry.rotations import unit
 
-__all__ = ["update_multipliers"]
+__all__ = ["elastic_multipliers", "update_multipliers"]
 
 _TORN = 3.0
 """Friction in excess of Coulomb's bound, over that bound, above which the pressures of the same solve are discarded."""
@@ -65,6 +65,18 @@ def update_multipliers(
     return replace(
         state, pressure=normal, friction=friction, pressed_for=pressed_for, slip_anchor=anchor, sticking=sticking
     )
+
+
+def elastic_multipliers(pair: Pair, before: ContactState, state: ContactState, *, ended: bool) -> ContactState:
+    """The state after an update, without multipliers if the pair is elastic.
+
+    Its tractions are those of the penalty alone; the shear of a bond is that at the end of the last step, plus the
+    penalty's. ``ended`` is the end of a step.
+    """
+    if not pair.elastic:
+        return state
+    shear = np.where(state.bonded[:, None], state.friction if ended else before.friction, 0.0)
+    return replace(state, pressure=np.zeros_like(state.pressure), friction=shear)
 
 
 def _by_return_mapping(

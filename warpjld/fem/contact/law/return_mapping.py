@@ -97,7 +97,8 @@ def return_mapping(
     bound = np.maximum(state.pressure[at] if before else pressure, 0.0)
     grips = active & ((state.pressed_for[at] >= FRICTION_FROM) | bonded)
     limit = np.where(grips, pair.friction * bound, 0.0)
-    friction, sticking, tangent = _friction(state, points, across, slip, penalty, grips, limit, decides)
+    trial = decides is ActiveSet.TRIAL or pair.elastic
+    friction, sticking, tangent = _friction(state, points, across, slip, penalty, grips, limit, trial=trial)
     blocks += np.where(grips, points.area, 0.0)[:, None, None] * tangent
     return ContactTractions(pressure, friction, active, sticking, error, blocks)
 
@@ -110,17 +111,21 @@ def _friction(
     penalty: Array,
     grips: Mask,
     limit: Array,
-    decides: ActiveSet,
+    *,
+    trial: bool,
 ) -> tuple[Array, Mask, Array]:
-    """Friction [Pa] (m, 3), stick state (m,), and the negative derivative of friction by slip [Pa/m] (m, 3, 3)."""
+    """Friction [Pa] (m, 3), stick state (m,), and the negative derivative of friction by slip [Pa/m] (m, 3, 3).
+
+    ``trial``: points stick or slide by the trial tractions, not by the previous state.
+    """
     at = points.sites
     slip = np.einsum("mij,mj->mi", across, slip - state.slip_anchor[at])
     carried = np.einsum("mij,mj->mi", across, state.friction[at])
-    trial = carried - penalty[:, None] * slip
-    if decides is ActiveSet.TRIAL:
-        size = np.linalg.norm(trial, axis=1)
+    traction = carried - penalty[:, None] * slip
+    if trial:
+        size = np.linalg.norm(traction, axis=1)
         sticking = grips & ((size <= limit) | state.bonded[at])
-        along = unit(trial)
+        along = unit(traction)
         turning = penalty * np.divide(limit, size, out=np.zeros(len(at)), where=size > 0.0)
     else:
         sticking = grips & (state.sticking[at] | state.bonded[at])
@@ -128,7 +133,7 @@ def _friction(
         # stiffness against turning of the slip direction, inversely proportional to the slip
         far = np.linalg.norm(slip, axis=1)
         turning = np.minimum(penalty, np.divide(limit, far, out=penalty.copy(), where=far > 0.0))
-    friction = np.where(sticking[:, None], trial, limit[:, None] * along)
+    friction = np.where(sticking[:, None], traction, limit[:, None] * along)
     turning = np.where(limit > 0.0, turning, 0.0)
     beside = across - along[:, :, None] * along[:, None, :]
     tangent = np.where(sticking[:, None, None], penalty[:, None, None] * across, turning[:, None, None] * beside)

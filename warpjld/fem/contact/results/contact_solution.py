@@ -121,6 +121,7 @@ class ContactInstant:
         solves: Linear solves since the previous instant, failed steps included.
         iterations: Iterations of these.
         residual: True residual relative to the forces in balance, in float64.
+        velocity: Velocities in a solve with inertia [m/s], shape (N, 3); None without.
     """
 
     time: float
@@ -130,6 +131,7 @@ class ContactInstant:
     solves: int
     iterations: int
     residual: float
+    velocity: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -112,7 +112,7 @@ class ContactNewton:
 
     def _search(self, state: NewtonState, step: LoadStep) -> tuple[SolveStatus, Equilibrium | None]:
         """Newton iterations from a state (steps 1–5 of the algorithm)."""
-        unconstrained = self._unconstrained(step.prescribed)
+        unconstrained = self._unconstrained(step)
         self._solver.begin()
         self._damping.begin()
         falls, nearest, least, stalled = 0, np.inf, np.inf, 0
@@ -171,6 +171,8 @@ class ContactNewton:
         blocks = [t.blocks for t in contact.tractions]
         lent = self._damping.lend(stiffness)
         matrix = steadied(with_contact(lent, contact.points, blocks, threads=self.body.threads))
+        if state.step.inertia is not None:
+            matrix = state.step.inertia.added_to(matrix)
         right = state.residual - matrix.product(state.jump, threads=self.body.threads)
         if contact.nonsymmetric is not None:
             right -= state.free * (contact.nonsymmetric @ state.jump)
@@ -213,8 +215,12 @@ class ContactNewton:
             length = length_by_residual(state, move, length)
         return length
 
-    def _unconstrained(self, prescribed: Prescribed) -> UnconstrainedBodies:
-        key = prescribed.degrees.tobytes()
+    def _unconstrained(self, step: LoadStep) -> UnconstrainedBodies:
+        """Bodies that nothing but contact holds; none with inertia, which resists every motion."""
+        known = step.prescribed
+        if step.inertia is not None:
+            known = Prescribed(np.arange(self.body.degrees), np.zeros(self.body.degrees))
+        key = known.degrees.tobytes()
         if self._free is None or self._free[0] != key:
-            self._free = (key, UnconstrainedBodies(self.body, prescribed, self._elastic.stiffness))
+            self._free = (key, UnconstrainedBodies(self.body, known, self._elastic.stiffness))
         return self._free[1]

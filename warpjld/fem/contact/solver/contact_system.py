@@ -11,9 +11,10 @@ from warpjld.fem.arrays import Array, Mask
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
-from warpjld.fem.contact.law.multipliers import update_multipliers
+from warpjld.fem.contact.law.multipliers import elastic_multipliers, update_multipliers
 from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping
 from warpjld.fem.contact.solver.tangent import friction_coupling, linearise_mortar
+from warpjld.fem.load.inertia import Inertia
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
 
@@ -34,6 +35,8 @@ IMMOBILE = 1e-9
 """Mobility (see ``mobility``) below which a point counts as prescribed along its normal."""
 _SETTLED = 2e-3
 """Convergence tolerance of the multipliers: change relative to the contact forces, (6) of ``contact.solver``."""
+_SLIGHT = 0.01
+"""Penetration over what is admissible, below which redundant multipliers need not settle."""
 _SLOW = 0.1
 """Fraction of the penetration remaining after a linear solve above which the penalty of a site is raised."""
 _STIFFER, _STIFFEST = 5.0, 3125.0
@@ -50,6 +53,7 @@ class LoadStep:
         prescribed: Dirichlet conditions at ``time``.
         loads: Loads at ``time``.
         allowed: Fraction of the initial overlap that is still admissible at ``time``.
+        inertia: Inertia in an implicit Euler step of that length; None: a quasi-static step.
     """
 
     before: float
@@ -57,6 +61,7 @@ class LoadStep:
     prescribed: Prescribed
     loads: Loads
     allowed: float
+    inertia: Inertia | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,15 +219,19 @@ class ContactSystem:
         predicted: list[ContactTractions],
         move: Array,
         decides: ActiveSet,
+        *,
+        ended: bool = False,
     ) -> list[ContactState]:
-        """Contact states after a move (3N,) with predicted tractions (multiplier update)."""
+        """Contact states after a move (3N,) with predicted tractions (multiplier update); ``ended``: of a step."""
         out = []
         for k, (slip, s, p, t) in enumerate(
             zip(self._slips(contact, move), states, contact.points, predicted, strict=True)
         ):
             now, penalty = contact.tractions[k], self._penalty(k, p, s)
-            s = update_multipliers(self.interfaces[k].pair, s, p, t, slip, penalty, now.active, decides)
-            out.append(replace(s, stiffening=self._stiffer(k, s, p, now, t)))
+            pair = self.interfaces[k].pair
+            new = update_multipliers(pair, s, p, t, slip, penalty, now.active, decides)
+            new = elastic_multipliers(pair, s, new, ended=ended)
+            out.append(replace(new, stiffening=self._stiffer(k, new, p, now, t)))
         return out
 
     def _stiffer(
@@ -245,32 +254,49 @@ class ContactSystem:
         """Penalty ε of points [Pa/m]."""
         return np.asarray((self._penalties[k] * state.stiffening)[points.sites])
 
-    def begun(self, states: list[ContactState], start: Array, time: float) -> list[ContactState]:
-        """States with ``open_before`` set for the start of a step, on interfaces with friction."""
+    def begun(self, states: list[ContactState], start: Array, step: LoadStep) -> list[ContactState]:
+        """States with ``open_before`` set for the start of a step, on interfaces with friction.
+
+        With inertia no site slides freely before contact begins: friction acts on the velocity at the end of the step.
+        """
         x = self._rest + start.reshape(-1, 3)
         out = []
         for interface, s in zip(self.interfaces, states, strict=True):
             if interface.pair.friction > 0.0:
-                points = interface.points(x, time, time)
-                apart = np.ones(len(s.open_before), dtype=bool)
-                apart[points.sites] = points.gap > self._penetration * interface.edge[points.sites]
+                points = interface.points(x, step.before, step.before)
+                apart = np.full(len(s.open_before), step.inertia is None)
+                apart[points.sites] &= points.gap > self._penetration * interface.edge[points.sites]
                 s = replace(s, open_before=apart)
             out.append(s)
         return out
 
     def settled(self, contact: ContactForces, states: list[ContactState], negligible: float) -> bool:
         """Whether the multipliers have converged: penetration is admissible, and forces change by less than the
-        tolerance, or than ``negligible`` [N]."""
+        tolerance, or than ``negligible`` [N].
+
+        Where two sides are bonded and both stick to a third, constraints are redundant, and their multipliers may go on
+        changing without any effect. Changes that cancel at the nodes count as settled if penetration is far below what
+        is admissible.
+        """
+        deepest, settled, total = 0.0, True, 0.0
+        changed = np.zeros_like(self._rest)
         for k, (p, t, s) in enumerate(zip(contact.points, contact.tractions, states, strict=True)):
             if not t.active.any():
                 continue
-            if (t.error / self.interfaces[k].edge[p.sites]).max() > self._penetration:
+            deepest = max(deepest, float((t.error / self.interfaces[k].edge[p.sites]).max()))
+            if deepest > self._penetration:
                 return False
-            change = np.abs(t.pressure - s.pressure[p.sites]) + np.linalg.norm(t.friction - s.friction[p.sites], axis=1)
-            size = np.abs(t.pressure) + np.linalg.norm(t.friction, axis=1)
-            if p.area @ change > max(_SETTLED * (p.area @ size), negligible):
-                return False
-        return True
+            if self.interfaces[k].pair.elastic:
+                continue
+            pressure, friction = t.pressure - s.pressure[p.sites], t.friction - s.friction[p.sites]
+            change = p.area @ (np.abs(pressure) + np.linalg.norm(friction, axis=1))
+            size = float(p.area @ (np.abs(t.pressure) + np.linalg.norm(t.friction, axis=1)))
+            settled = settled and change <= max(_SETTLED * size, negligible)
+            total += size
+            changed += p.forces(friction - pressure[:, None] * p.normal)
+        if settled or deepest > _SLIGHT * self._penetration:
+            return settled
+        return bool(np.linalg.norm(changed, axis=1).sum() <= max(_SETTLED * total, negligible))
 
     def mismatch(
         self, fresh: list[ContactPoints], points: list[ContactPoints], tractions: list[ContactTractions]

@@ -16,7 +16,7 @@ def first_state(interface: Interface, nodes: Array) -> ContactState:
     """Initial state of an interface between undeformed bodies with nodes [m], shape (N, 3).
 
     Raises:
-        InputError: A bond whose two sides do not meet.
+        InputError: A bond whose two sides do not meet, or whose parted sites are of another surface.
     """
     state = initial_state(len(interface.edge), interface.pair)
     points = interface.points(nodes, 0.0, 0.0)
@@ -24,6 +24,10 @@ def first_state(interface: Interface, nodes: Array) -> ContactState:
         state.bond_gap[points.sites] = points.gap
         if len(points.sites) == 0:
             raise InputError(f"{interface.pair.title}: a bond to nothing: its two sides do not meet")
+        if parted := interface.pair.bond.parted:
+            if len(parted) != len(state.bonded):
+                raise InputError(f"{interface.pair.title}: parted: want {len(state.bonded)} values, got {len(parted)}")
+            state.bond_gap[np.array(parted)] = np.nan
         state.bonded[np.isnan(state.bond_gap)] = False
     else:
         state.allowance[points.sites] = np.maximum(-points.gap, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,19 +15,20 @@ from warpjld.fem.contact.interface.contact_interface import interfaces_of
 from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import without_bonds
 from warpjld.fem.contact.law.return_mapping import overstrained
-from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution, LastStep
-from warpjld.fem.contact.results.touches import touch_of
+from warpjld.fem.contact.results.contact_solution import ContactInstant, ContactSolution
 from warpjld.fem.contact.solver.contact_newton import ContactNewton
 from warpjld.fem.contact.solver.contact_system import LoadStep
 from warpjld.fem.contact.solver.first_states import first_state
 from warpjld.fem.contact.solver.first_touch import first_touch, slid_unheld, touched_at
 from warpjld.fem.contact.solver.friction_continuation import continue_in_friction
+from warpjld.fem.contact.solver.instants import instant_of, last_step_of
 from warpjld.fem.contact.solver.newton_state import Equilibrium
 from warpjld.fem.contact.solver.passing import Passing, guess_jumps
 from warpjld.fem.contact.solver.predicted_motion import PredictedMotion
 from warpjld.fem.contact.solver.solve_budget import SolveBudget
 from warpjld.fem.contact.solver.statics import could_balance
 from warpjld.fem.contact.solver.unconstrained import blocked
+from warpjld.fem.load.inertia import Dynamics, Inertia, lumped_masses
 from warpjld.fem.load.loads import Loads, external_forces
 from warpjld.fem.load.prescribed import Prescribed, free_motions
 from warpjld.fem.solver.krylov import SolveStatus
@@ -69,6 +71,7 @@ class LoadSteps:
         u: Displacement of the last equilibrium [m], shape (3N,).
         states: Contact state of each interface there.
         steps: Number of linear solves of each load step taken.
+        velocity: Velocity there [m/s], shape (3N,); None without inertia.
     """
 
     def __init__(
@@ -84,6 +87,7 @@ class LoadSteps:
         guess: Guess | None = None,
         halvings: int | None = None,
         solves: int | None = None,
+        dynamics: Dynamics | None = None,
     ) -> None:
         self.body = body
         self.times = times
@@ -111,6 +115,9 @@ class LoadSteps:
             self.u = after.last.displacement.reshape(-1).copy()
             self.states = list(after.states)
         self.steps: list[int] = []
+        self._dynamics = None if dynamics is None else dynamics.checked(body)
+        self._masses = None if dynamics is None else lumped_masses(body)
+        self.velocity: Array | None = None if dynamics is None else np.asarray(dynamics.velocity, float).reshape(-1)
         self.correction_rate = None if after is None else after.correction_rate
         self.last_step = None if after is None else after.last_step
 
@@ -125,7 +132,17 @@ class LoadSteps:
         known = self.prescribed
         now = known(time) if callable(known) else known.scaled(share)
         loads = self.loads(time) if callable(self.loads) else self.loads.scaled(share)
-        return LoadStep(before, time, now, loads, self.allowed(time))
+        return LoadStep(before, time, now, loads, self.allowed(time), self._inertia(before, time))
+
+    def _inertia(self, before: float, time: float) -> Inertia | None:
+        """Inertia in a step between two times."""
+        if self._dynamics is None or self._masses is None or self.velocity is None:
+            return None
+        return Inertia(self._masses, self.u, self.velocity, self._dynamics.second * (time - before))
+
+    def _leaves_free(self, step: LoadStep) -> bool:
+        """Whether nothing but contact holds a body in a step."""
+        return step.inertia is None and self.motion.leaves_free(step.prescribed)
 
     def allowed(self, time: float) -> float:
         """Share of the overlap at the start that is still allowed at a time."""
@@ -140,7 +157,7 @@ class LoadSteps:
         now, halvings = self.start, 0
         reached: list[ContactInstant] = []
         todo = list(self.times)
-        newton, budget = self.newton, self.budget
+        newton, budget, sides = self.newton, self.budget, (self.interfaces, self.moduli)
         cuts, touches, cut, unstable = 0, 0, 1.0, False
         unheld: tuple[float, Array, LoadStep, Equilibrium] | None = None
         while todo:
@@ -154,7 +171,7 @@ class LoadSteps:
                 todo.insert(0, now + share * (target - now))
                 continue
             status, found = self._find(step, carried)
-            most = _TOUCHES_FREE if self.motion.leaves_free(step.prescribed) else _TOUCHES
+            most = _TOUCHES_FREE if self._leaves_free(step) else _TOUCHES if step.inertia is None else 0
             if found is not None and touches < most and slid_unheld(self.interfaces, self.states, self.u, found):
                 touches, unheld = touches + 1, (target, carried, step, found)
                 todo.insert(0, 0.5 * (now + target))
@@ -183,15 +200,15 @@ class LoadSteps:
                 report(f"time {target:.3g}: {status.value}; halving the step")
                 todo.insert(0, 0.5 * (now + target))
                 continue
-            self._take(found, carried, now, target)
+            self._take(found, carried, step)
             now, cut, unstable = target, 1.0, False
             todo.pop(0)
             halvings = max(0, halvings - 1)
             if target not in self.times:
                 continue
-            solves, iterations = budget.reached()
-            reached.append(self._instant(target, found, solves, iterations))
-            report(f"time {target:.3g}: {solves} solves, {iterations} iterations, residual {found.residual:.1e}")
+            one = instant_of(self.body.mesh.nodes, *sides, target, found, *budget.reached(), self.velocity)
+            reached.append(one)
+            report(f"time {target:.3g}: {one.solves} solves, {one.iterations} iterations, residual {one.residual:.1e}")
             touches = 0
             if watch and (stop := watch(reached[-1])):
                 return self._end(SolveStatus.STOPPED, reached, stop, step)
@@ -213,20 +230,26 @@ class LoadSteps:
     def _share(self, step: LoadStep, carried: Array, cut: float, *, may_cut: bool) -> tuple[float, float]:
         """Fraction of a step to take, so that bodies do not pass through each other and friction acts from the first
         contact on; and the fraction due to the former, by which ``guess_jumps`` detects discontinuous predictors."""
-        ahead = self.motion.displacement(self.u, step.prescribed) if self.guess is None else carried
+        predicts = self.guess is not None or step.inertia is not None
+        ahead = carried if predicts else self.motion.displacement(self.u, step.prescribed)
         share = self.passing.share(self.u, ahead, step.before, step.time)
         if share < _WHOLE and may_cut and not guess_jumps(share, cut):
             return share, share
+        if step.inertia is not None:
+            return 1.0, cut
         motion = (self.body.mesh.nodes, self.u, ahead)
         self.states = touched_at(self.interfaces, self.states, *motion, step)
         share = first_touch(self.interfaces, self.states, *motion, step)
         return share if _TOUCHING < share < _WHOLE and may_cut else 1.0, cut
 
-    def _take(self, found: Equilibrium, carried: Array, now: float, target: float) -> None:
+    def _take(self, found: Equilibrium, carried: Array, step: LoadStep) -> None:
         """Accept an equilibrium as the start of the next step."""
+        now, target = step.before, step.time
         self.steps.append(self.newton.solves)
         self.correction_rate = (found.displacement - carried).reshape(-1, 3) / (target - now)
-        self.last_step = self._last_step(now, found)
+        self.last_step = last_step_of(self.interfaces, now, self.u, found)
+        if step.inertia is not None:
+            self.velocity = step.inertia.velocity_at(found.displacement)
         self.u, self.states = found.displacement, found.states
         if target in self.times:
             for interface, reach in zip(self.interfaces, self._reaches, strict=True):
@@ -276,12 +299,14 @@ class LoadSteps:
             if not any(mask.any() for mask in broken):
                 return status, found
             states = [without_bonds(s, mask) for s, mask in zip(found.states, broken, strict=True)]
+            if step.inertia is not None:  # bonds overstrained at the end of a step are open in the next one
+                return status, replace(found, states=states)
             status, found = self.newton.find(self.u, states, step, found.displacement)
         return SolveStatus.MAX_ITERATIONS, None
 
     def _held_by_friction(self, step: LoadStep) -> bool:
         """Whether a free body may be held by friction."""
-        return self.motion.leaves_free(step.prescribed) and any(i.pair.friction > 0.0 for i in self.interfaces)
+        return self._leaves_free(step) and any(i.pair.friction > 0.0 for i in self.interfaces)
 
     def _could_hold(self, step: LoadStep) -> bool:
         """Whether contact forces inside the friction cones could balance every free body (necessary condition)."""
@@ -293,42 +318,17 @@ class LoadSteps:
         return all(could_balance(nodes, *known) for nodes in free)
 
     def _carried(self, step: LoadStep) -> Array:
-        """Displacement at the start of a step, advanced by the caller's predictor, shape (3N,)."""
+        """Displacement at the start of a step, advanced by the caller's predictor or its velocity, shape (3N,)."""
         if self.guess is None:
-            return self.u
+            return self.u if step.inertia is None else step.inertia.coasted
         return np.asarray(self.guess(step.before, step.time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
 
     def _guesses(self, step: LoadStep, carried: Array) -> list[Array]:
         """Initial guesses: the predictor with the last step's correction repeated, and the predictor alone."""
-        plain = [] if self.guess is None else [carried]
+        plain = [] if self.guess is None and step.inertia is None else [carried]
         if self.correction_rate is None:
             return plain
         return [carried + _PART * (step.time - step.before) * self.correction_rate.reshape(-1), *plain]
-
-    def _last_step(self, before: float, found: Equilibrium) -> LastStep:
-        """Start of the step to an equilibrium, with its slips and areas, for sensitivities."""
-        slips = [np.zeros((len(interface.edge), 3)) for interface in self.interfaces]
-        areas = [np.zeros(len(interface.edge)) for interface in self.interfaces]
-        for k, points in enumerate(found.points):
-            slips[k][points.sites], areas[k][points.sites] = found.slips[k], points.area
-        return LastStep(before, self.u.reshape(-1, 3), tuple(slips), tuple(areas))
-
-    def _instant(self, time: float, found: Equilibrium, solves: int, iterations: int) -> ContactInstant:
-        x = self.body.mesh.nodes + found.displacement.reshape(-1, 3)
-        touches = []
-        for k, interface in enumerate(self.interfaces):
-            points, tractions, slip = found.points[k], found.tractions[k], found.slips[k]
-            touches.append(touch_of(interface, points, tractions, slip, found.states[k].bonded, self.moduli[k], x))
-        shape = (-1, 3)
-        return ContactInstant(
-            time,
-            found.displacement.reshape(shape),
-            found.reactions.reshape(shape),
-            tuple(touches),
-            solves,
-            iterations,
-            found.residual,
-        )
 
     def _end(self, status: SolveStatus, reached: list[ContactInstant], message: str, step: LoadStep) -> ContactSolution:
         if not reached:

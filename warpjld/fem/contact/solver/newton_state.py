@@ -114,7 +114,7 @@ class NewtonState:
         self.elastic, self.system, self.step, self.start = elastic, system, step, start
         self._tolerance, self._penetration = tolerance, penetration
         self.free = step.prescribed.free(len(start))
-        self.states = self._before = system.begun(states, start, step.before)
+        self.states = self._before = system.begun(states, start, step)
         self.jump = np.zeros_like(start)
         self._pressures: Array | None = None
         self._iteration, self._settled, self._same_for, self._stumbles = -1, False, 0, 0
@@ -162,8 +162,13 @@ class NewtonState:
         return self.system.predicted(self.contact, self.states, move, self.step.allowed, self.predicts)
 
     def pull(self, u: Array) -> Array:
-        """External minus internal forces of the bodies at displacement u, without contact [N], shape (3N,)."""
-        return self.elastic.external(self.step.loads, u) - self.elastic.forces(u).forces
+        """External, inertial and minus internal forces of the bodies at displacement u, without contact [N], (3N,)."""
+        return self._external(u) - self.elastic.forces(u).forces
+
+    def _external(self, u: Array) -> Array:
+        """External and inertial forces at displacement u [N], shape (3N,)."""
+        loads = self.elastic.external(self.step.loads, u)
+        return loads if self.step.inertia is None else loads + self.step.inertia.force(u)
 
     def left_over(self) -> float:
         """Norm of the residual at free degrees of freedom [N]."""
@@ -174,13 +179,15 @@ class NewtonState:
         self._iteration += 1
         elastic, u, free, contact = self.elastic, self.u, self.free, self.contact
         self.tangent = elastic.at(u, self._pressures, self.step.loads)
-        external = elastic.external(self.step.loads, u)
+        external, inertia = self._external(u), self.step.inertia
         self.residual = np.where(free, external + contact.forces - self.tangent.forces, 0.0)
         self._reactions = np.where(free, 0.0, self.tangent.forces - external - contact.forces)
         pushed = norm(np.where(free, contact.forces, 0.0))
-        scale = max(norm(external), pushed, norm(self._reactions), 1e-300)
-        self.unbalanced = norm(self.residual) / scale
         moved = norm(np.repeat(elastic.stiffness, 3) * u)
+        scale = max(norm(external), pushed, norm(self._reactions), 1e-300)
+        if inertia is not None:
+            scale, moved = max(scale, norm(inertia.force(u))), moved + inertia.rounding(u)
+        self.unbalanced = norm(self.residual) / scale
         noise = _ROUNDING * (moved + _PLACES * norm(elastic.stiffness) * elastic.body.mesh.size)
         self._negligible = max(self._tolerance * scale, noise)
         self._near = self.unbalanced <= max(self._tolerance, noise / scale)
@@ -220,7 +227,7 @@ class NewtonState:
         """The equilibrium at u, with contact states for the next step."""
         contact = self.contact
         zero = np.zeros_like(self.u)
-        kept = self.system.updated(self.states, contact, contact.tractions, zero, ActiveSet.TRIAL)
+        kept = self.system.updated(self.states, contact, contact.tractions, zero, ActiveSet.TRIAL, ended=True)
         left = 1.0 if self.step.allowed > 0.0 else 0.0  # once removed, initial overlaps are no longer admissible
         kept = [replace(s, slip_anchor=np.zeros_like(s.slip_anchor), allowance=left * s.allowance) for s in kept]
         # sliding before contact began is not slip
