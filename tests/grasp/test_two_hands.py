@@ -19,6 +19,7 @@ def both(hands):
     return {side: bind_kept(rig)[0] for side, rig in hands.items()}
 
 
+@pytest.mark.slow
 def test_palms_are_opposed_across_a_crate(both) -> None:
     thing = box(0.4, 0.3, 0.35).placed((0.1, 0.9, 0.3), (0.0, 0.3, 0.0, 0.95))
     found = find_two_handed(both, thing, count=24)

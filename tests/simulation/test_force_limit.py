@@ -44,6 +44,7 @@ def test_a_digit_stops_where_its_skin_bears_no_more(run: Callable[[str], Scene],
     assert stop.endswith("° short: its skin is pressed with 60 kPa")
 
 
+@pytest.mark.slow
 def test_muscles_end_it_where_they_are_weaker(run: Callable[[str], Scene], tmp_path: Path) -> None:
     scene = run(FINGER + "STRENGTH LEFT INDEX 0.5\nPRESS 0 4")
     found = run_contact(scene, tmp_path)

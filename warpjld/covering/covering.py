@@ -113,15 +113,15 @@ class Covering:
     ) -> NDArray[np.float64]:
         """Length scale of the diffusion at every vertex of the flesh [m], shape (n,).
 
-        Outside digits at least the mean thickness around: skin close to a bone, as on top of a shoulder, would else
+        Outside hands at least the mean thickness around: skin close to a bone, as on top of a shoulder, would else
         fold. Knuckles, which are close to bones too, may show, and digits keep more of their volume so.
         """
         own = thickness(self.anchors, self.skeleton.rest)[flesh]
-        digits, stiff = (
+        hands, stiff = (
             self.domains[flesh] @ np.array([kind(fan) for fan in self.fans], dtype=np.float64)
-            for kind in (lambda fan: is_digit(fan.name), lambda fan: fan.stiff)
+            for kind in (lambda fan: is_digit(fan.name) or len(fan.segments) > 1, lambda fan: fan.stiff)
         )
-        reach = own + (1.0 - digits) * np.maximum(mean_thickness(vertices, faces, own) - own, 0.0)
+        reach = own + (1.0 - hands) * np.maximum(mean_thickness(vertices, faces, own) - own, 0.0)
         # a skull does not bend, so it needs less smoothing, and lids must stay on the eyes
         return np.asarray(reach * (1.0 - _STIFF * stiff))
 

@@ -50,7 +50,7 @@ def cycle(wrap: float, friction: float, cells: int) -> tuple[ContactSolution, np
     return press(Body(mesh, NeoHooke(1e7, 0.3)), held, [pair], times=(0.5, 1.0, 1.5, 2.0)), *ends
 
 
-@pytest.mark.parametrize("friction", [0.1, 0.6])
+@pytest.mark.parametrize("friction", [pytest.param(0.1, marks=pytest.mark.slow), 0.6])
 def test_a_belt_bears_e_to_the_friction_times_the_angle(friction: float) -> None:
     """Forth and back; nodes .065 apart bear 2 % less at μ .6, and the belt's middle is a little farther out."""
     wrap = 0.5 * np.pi

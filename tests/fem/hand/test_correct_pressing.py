@@ -129,6 +129,7 @@ def test_the_finger_is_opened_until_the_plate_pushes_as_hard_as_it_may(finger: P
     assert not by[1:].any()
 
 
+@pytest.mark.slow
 def test_the_suggested_opening_lowers_the_force_as_far_as_said(finger: PressedFinger) -> None:
     before, now = finger.angles(1.4), finger.angles(1.6)
     first, second = finger.effort(before), finger.effort(now)

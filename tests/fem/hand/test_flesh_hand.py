@@ -60,6 +60,7 @@ def test_guess_is_exact_for_a_hand_moved_as_a_whole(hand: FleshHand) -> None:
     np.testing.assert_allclose(placed.skin(), surface, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_step_from_the_guess_saves_newton_steps_and_ends_at_the_same_place(coarse: FleshHand) -> None:
     motion = motion_of(coarse, curled(coarse, 10.0))
     body = Body(coarse.mesh, hand_laws(coarse.mesh.region_names))

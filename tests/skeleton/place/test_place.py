@@ -125,6 +125,7 @@ def test_what_is_placed_is_written_and_loads_as_it_is(hands, tmp_path):
         np.testing.assert_allclose(place, wanted[name], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_neither_body_nor_hand_is_refused(tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3)
     ball.apply_scale([0.1, 1.0, 0.1])
