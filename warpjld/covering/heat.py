@@ -148,7 +148,7 @@ def diffused(
     values: NDArray[np.float64],
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
-    reach: NDArray[np.float64],
+    tau: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """One field after heat diffusion over a surface in two implicit steps, by conjugate gradients, shape (V,).
 
@@ -158,9 +158,9 @@ def diffused(
         values: The field, shape (V,).
         vertices: Vertex positions [m], shape (V, 3).
         faces: Triangles, shape (T, 3).
-        reach: Square of the diffusion length at every vertex [m²], shape (V,).
+        tau: Square of the diffusion length at every vertex [m²], shape (V,).
     """
-    laplacian, area = _cotangents(vertices, faces, lambda i, j: (reach[i] + reach[j]) / 4.0)
+    laplacian, area = _cotangents(vertices, faces, lambda i, j: (tau[i] + tau[j]) / 4.0)
     matrix = sp.diags_array(area) + laplacian
     scale = 1.0 / np.sqrt(matrix.diagonal())
     scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsr()

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from warpjld.geometry.coincident import connected_parts
 from warpjld.simulation.specification import BondStrength
 
 __all__ = ["bonded_groups"]
@@ -11,13 +14,9 @@ __all__ = ["bonded_groups"]
 
 def bonded_groups(names: Iterable[str], bonds: Sequence[BondStrength]) -> list[list[str]]:
     """Names that bonds connect, in order; those without a bond alone. Bonds to other names are left out."""
-    groups = {name: [name] for name in names}
-    for bond in bonds:
-        one, other = groups.get(bond.one), groups.get(bond.other)
-        if one is None or other is None or one is other:
-            continue
-        one += other
-        groups |= dict.fromkeys(other, one)
-    order = {name: k for k, name in enumerate(groups)}
-    found = {id(group): sorted(group, key=order.__getitem__) for group in groups.values()}
-    return list(found.values())
+    number = {name: k for k, name in enumerate(names)}
+    pairs = [(number[b.one], number[b.other]) for b in bonds if b.one in number and b.other in number]
+    groups: dict[int, list[str]] = {}
+    for name, label in zip(number, connected_parts(np.array(pairs, np.int64).reshape(-1, 2), len(number)), strict=True):
+        groups.setdefault(int(label), []).append(name)
+    return list(groups.values())
