@@ -38,7 +38,7 @@ _TOLERANCE = 1e-7  # residual at which iterative solvers stop, relative to the r
 _ACCEPTED = 1e-5  # largest relative residual of an accepted solution
 _MULTIGRID_STEPS = 200  # iteration limit
 _MEAN = 1e-8  # residual of a field that is diffused alone, relative: mirror images differ by less than rounding shows
-_MEAN_STEPS = 1_000  # its iteration limit: a body of 300,000 vertices takes 80
+_MEAN_STEPS = 1_000  # its iteration limit; beyond it the field is left as it was
 _PLAIN_STEPS = 5_000  # iteration limit of conjugate gradients without multigrid
 
 
