@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from warpjld.covering.heat import DiffusionFactor, conducting_laplacian, solve_diffusion
+from warpjld.covering.heat import DiffusionFactor, solve_diffusion
+from warpjld.covering.laplacian import conducting_laplacian
 from warpjld.rig import Rig
 
 

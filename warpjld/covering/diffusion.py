@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import DiffusionFactor, conducting_laplacian, uniform_laplacian
+from warpjld.covering.heat import DiffusionFactor
+from warpjld.covering.laplacian import conducting_laplacian, uniform_laplacian
 from warpjld.geometry.spatial_order import spatial_order
 from warpjld.runtime.lazily import lazy_module
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import cotangent_laplacian, solve_diffusion, uniform_laplacian
+from warpjld.covering.heat import solve_diffusion
+from warpjld.covering.laplacian import cotangent_laplacian, uniform_laplacian
 from warpjld.covering.operators import Fan, segment_ends
 from warpjld.covering.skull import skull_lines
 from warpjld.errors import InputError

@@ -1,16 +1,16 @@
-"""Laplacians of triangulated surfaces, and robust sparse solvers for stationary and implicit heat diffusion."""
+"""Robust sparse solvers for stationary and implicit heat diffusion over surfaces."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.corners import corner_conductivity
+from warpjld.covering.laplacian import cotangents
 from warpjld.runtime.lazily import lazy_module
 from warpjld.runtime.threads import in_threads, one_blas_thread, threads_for
 
@@ -21,14 +21,7 @@ else:
     sp = lazy_module("scipy.sparse")
     linalg = lazy_module("scipy.sparse.linalg")
 
-__all__ = [
-    "DiffusionFactor",
-    "conducting_laplacian",
-    "cotangent_laplacian",
-    "diffused",
-    "solve_diffusion",
-    "uniform_laplacian",
-]
+__all__ = ["DiffusionFactor", "diffused", "solve_diffusion"]
 
 # vertices up to which a sparse factorisation is used: with 60 right-hand sides it is far faster than multigrid; beyond,
 # its memory (1.5 kB a vertex) is too large
@@ -40,65 +33,6 @@ _MULTIGRID_STEPS = 200  # iteration limit
 _MEAN = 1e-8  # residual of a field that is diffused alone, relative: mirror images differ by less than rounding shows
 _MEAN_STEPS = 1_000  # its iteration limit; beyond it the field is left as it was
 _PLAIN_STEPS = 5_000  # iteration limit of conjugate gradients without multigrid
-
-
-def cotangent_laplacian(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], thickness: NDArray[np.float64]
-) -> tuple[sp.csr_array, NDArray[np.float64]]:
-    """Positive semidefinite cotangent Laplacian, shape (V, V), and barycentric vertex areas, shape (V,).
-
-    Cotangents are clamped to 1e-3 … 1e3: negative weights would violate the maximum principle. The conductivity is
-    raised around saddle vertices, within a share of the ``thickness`` there, shape (V,) (``corners.py``).
-    """
-    conductivity = corner_conductivity(vertices, faces, thickness)
-    return _cotangents(vertices, faces, lambda i, j: conductivity)
-
-
-def conducting_laplacian(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    thickness: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
-) -> tuple[sp.csr_array, NDArray[np.float64]]:
-    """As :func:`cotangent_laplacian`, each edge's weight times the mean ``conductivity`` of its ends, shape (V,)."""
-    corner = corner_conductivity(vertices, faces, thickness)
-    return _cotangents(vertices, faces, lambda i, j: corner * (conductivity[i] + conductivity[j]) / 2.0)
-
-
-def _cotangents(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: Callable[[NDArray, NDArray], NDArray]
-) -> tuple[sp.csr_array, NDArray[np.float64]]:
-    """Cotangent Laplacian and vertex areas; ``conductivity(i, j)`` is that of the edges i to j of all triangles."""
-    count = len(vertices)
-    rows, columns, values = [], [], []
-    area = np.zeros(count)
-    for k in range(3):
-        apex, i, j = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
-        u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
-        twice = np.linalg.norm(np.cross(u, v), axis=1)
-        cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice, 1e-30), 1e-3, 1e3) / 2.0
-        rows += [i, j]
-        columns += [j, i]
-        values += [cotangent * conductivity(i, j)] * 2
-        np.add.at(area, apex, twice / 6.0)
-    positive = area[area > 0.0]
-    # vertices without faces, or with degenerate faces only, need a positive area too
-    area = np.maximum(area, 1e-6 * positive.mean()) if positive.size else np.full(count, 1.0 / count)
-    return _laplacian(np.concatenate(rows), np.concatenate(columns), np.concatenate(values), count), area
-
-
-def uniform_laplacian(faces: NDArray[np.int32], count: int) -> sp.csr_array:
-    """Graph Laplacian with equal edge weights, shape (V, V), for meshes too degenerate for cotangents."""
-    rows = np.concatenate([faces[:, k] for k in (0, 1, 2, 1, 2, 0)])
-    columns = np.concatenate([faces[:, k] for k in (1, 2, 0, 0, 1, 2)])
-    return _laplacian(rows, columns, np.full(len(rows), 0.5), count)
-
-
-def _laplacian(rows: NDArray, columns: NDArray, conducted: NDArray[np.float64], count: int) -> sp.csr_array:
-    """Laplacian with these off-diagonal weights; entries of the same place are summed."""
-    between = rows != columns
-    off = sp.coo_array((conducted[between], (rows[between], columns[between])), shape=(count, count)).tocsr()
-    return sp.diags_array(np.asarray(off.sum(axis=1)).ravel()) - off
 
 
 def solve_diffusion(
@@ -126,8 +60,7 @@ def solve_diffusion(
     diagonal = matrix.diagonal()
     if not (np.isfinite(matrix.data).all() and (diagonal > 0.0).all()):
         return None
-    scale = 1.0 / np.sqrt(diagonal)
-    scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsc()
+    scale, scaled = _unit_diagonal(matrix)
     goal = scale[:, None] * right
     solvers = (_direct, _plain) if len(scale) <= _DIRECT_LIMIT else (_multigrid, _plain)
     for solver in solvers:
@@ -142,6 +75,12 @@ def solve_diffusion(
         if np.isfinite(found).all() and (residual <= _ACCEPTED * np.linalg.norm(goal, axis=0) + 1e-300).all():
             return scale[:, None] * found
     return None
+
+
+def _unit_diagonal(matrix: sp.sparray) -> tuple[NDArray[np.float64], sp.csc_array]:
+    """S with S A S of unit diagonal, as its diagonal (V,), and S A S."""
+    scale = 1.0 / np.sqrt(matrix.diagonal())
+    return scale, (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsc()
 
 
 def diffused(
@@ -160,10 +99,8 @@ def diffused(
         faces: Triangles, shape (T, 3).
         tau: Square of the diffusion length at every vertex [m²], shape (V,).
     """
-    laplacian, area = _cotangents(vertices, faces, lambda i, j: (tau[i] + tau[j]) / 4.0)
-    matrix = sp.diags_array(area) + laplacian
-    scale = 1.0 / np.sqrt(matrix.diagonal())
-    scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsr()
+    laplacian, area = cotangents(vertices, faces, lambda i, j: (tau[i] + tau[j]) / 4.0)
+    scale, scaled = _unit_diagonal(sp.diags_array(area) + laplacian)
     out = values
     with one_blas_thread():
         for _ in range(2):
@@ -186,8 +123,7 @@ class DiffusionFactor:
     """
 
     def __init__(self, matrix: sp.sparray) -> None:
-        scale = 1.0 / np.sqrt(matrix.diagonal())
-        scaled = (sp.diags_array(scale) @ matrix @ sp.diags_array(scale)).tocsc()
+        scale, scaled = _unit_diagonal(matrix)
         with one_blas_thread():
             factors = _factorised(scaled)
         # without pivoting U = D Lᵀ, and rows are permuted as columns are
