@@ -41,7 +41,7 @@ class InterfaceSlopes:
         press: Normal multiplier p [Pa or N], shape (k,).
         rub: Friction q [Pa or N], shape (k, 3).
         slip: r = W (u − u₀) − carried, before projection onto the tangent plane [m], shape (k, 3).
-        sticks, slides: Masks, shape (k,); points with neither have no friction.
+        sticks, slides: Masks, shape (k,); friction is constant at points with neither.
         friction: μ.
         edge: Element edge [m], shape (k,).
         by_normal: ∂n/∂u, (3k, 3N).
@@ -190,9 +190,10 @@ def interface_slopes(
     # forces are the multipliers times the areas that the solver used last
     force = (step.areas[number][at[rows]] if slopes is not None else np.ones(len(rows)))[:, None]
     normal, rub = points.normal[rows], tangential(state.friction[at[rows]], points.normal[rows])
-    sticks = state.sticking[at[rows]] | state.bonded[at[rows]]
+    held, bonded = state.sticking[at[rows]], state.bonded[at[rows]]
+    sticks = bonded | (held & ~_drifting(state, at[rows]))
     rough = interface.pair.friction > 0.0 or bool(state.bonded.any())
-    slides = ~sticks & (np.linalg.norm(rub, axis=1) > 0.0) & rough
+    slides = ~held & ~bonded & (np.linalg.norm(rub, axis=1) > 0.0) & rough
     return InterfaceSlopes(
         sites=at[rows],
         weights=points.weights[rows],
@@ -212,6 +213,17 @@ def interface_slopes(
         obstacle=slopes,
         points=points.weights[rows] @ x,
     )
+
+
+def _drifting(state: ContactState, at: Ints) -> Mask:
+    """Mask of the sites at (k,) that slid freely in the last step until they touched, at a time that is not known.
+
+    They stick at the place where the solve found them first, which moves with the parameters as if nothing held them;
+    their friction hardly changes. Where an interface has no other site that sticks they hold, since a body that hangs
+    on them would have no derivative.
+    """
+    drifting = state.open_before[at] & (state.touched_at[at] == 1.0) & state.sticking[at]
+    return drifting & bool((state.sticking[at] & ~drifting).any())
 
 
 def _by_obstacle(
