@@ -1,4 +1,4 @@
-"""Long animations of FBX files are evaluated in processes of a few hundred frames each, since ufbx's binding keeps memory
+"""Long animations of FBX files are evaluated in processes of a few hundred frames each: ufbx's binding keeps memory
 of every frame."""
 
 from __future__ import annotations
