@@ -48,7 +48,9 @@ LIMITS = {
     "text": Limit(10_000, "characters", "a text in a script with its macro parameters put in"),
     "trials": Limit(1_000_000, "trials", "a study"),
     "instants": Limit(100_000, "instants", "a load step"),
-    "reader-bytes": Limit(2 << 30, "bytes", "memory of the process that reads USD, FBX or, by meshio, a mesh"),
+    "reader-bytes": Limit(
+        2 << 30, "bytes", "memory in which USD, FBX and meshio's meshes are read; five times that for large files"
+    ),
     "reader-seconds": Limit(600, "seconds", "the process that reads USD or FBX"),
     "mesh-seconds": Limit(15, "seconds", "the process that reads a mesh by meshio, besides one a megabyte of it"),
     "elements": Limit(2_000_000, "elements", "a finite-element mesh"),

@@ -72,6 +72,11 @@ def test_its_limits_are_those_of_this_process(path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv("WARPJLD_LIMIT_READER_BYTES", "30000000")
     with pytest.raises(InputError, match="needs more than 30,000,060 bytes"):
         _read(path, "memory", 10_000_000)
+    with path.open("ab") as file:
+        file.truncate(1 << 30)  # nothing is stored: 20 bytes of memory for each of its own, but no more than is stated
+    with pytest.raises(InputError, match="needs more than 150,000,000 bytes"):
+        _read(path, "memory", 40_000_000)
+    os.truncate(path, 3)
     monkeypatch.setenv("WARPJLD_LIMIT_READER_SECONDS", "1")
     with pytest.raises(InputError, match=r"not done after 1 s .*reader-seconds="):
         _read(path, "wait", 60)

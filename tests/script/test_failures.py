@@ -74,7 +74,7 @@ def test_places_are_looked_at_before(tmp_path: Path, monkeypatch: pytest.MonkeyP
         run_scene(scene, out, dry=True)
     usage = type("Usage", (), {"free": 1000})
     monkeypatch.setattr("warpjld.script.destinations.shutil.disk_usage", lambda place: usage)
-    with pytest.raises(InputError, match="are to be written, 0 MB are free"):
+    with pytest.raises(InputError, match="kB are to be written, 1 kB are free"):
         run_scene(scene, tmp_path / "other", dry=True)
 
 

@@ -110,7 +110,7 @@ def main(arguments: list[str] | None = None) -> None:
         click.echo(f"error: {one_line(str(error))}", err=True)
         sys.exit(1)
     except OSError as error:  # a full disk, a folder that was removed: a traceback would add nothing
-        what = f"{error.filename or 'a file'}: {error.strerror or error}"
+        what = f"{error.filename or 'standard output or a file'}: {error.strerror or error}"
         click.echo(f"error: {one_line(what)}", err=True)
         sys.exit(1)
     except MemoryError as error:

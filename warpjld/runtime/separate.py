@@ -25,6 +25,7 @@ from warpjld.runtime.separate_process import LATE, end_process, running_process
 __all__ = ["Answer", "separately"]
 
 _TRIES = 2  # a process may end, being idle, just when it is asked
+_MOST_SHARES = 4  # times the limit that a large file's bytes may add to it
 _lock = threading.RLock()
 
 
@@ -60,7 +61,8 @@ def separately(
         path: The file that it reads.
         kind: Expected kind of file, for messages.
         arguments: Further arguments, as JSON has them.
-        per_byte: Memory that it may use for each byte of the file, besides the limit ``reader-bytes``.
+        per_byte: Memory that it may use for each byte of the file, besides the limit ``reader-bytes`` and up to
+            four times as much as that.
         within: Name of the limit on the time that it may take.
         seconds_per_byte: Time that it may take for each byte of the file, besides that limit [s].
         once: Whether the process ends after the call, since the library leaves memory that is never freed.
@@ -68,7 +70,8 @@ def separately(
     Raises:
         InputError: As the function does; or the process crashed, needed too much memory, or did not end in time.
     """
-    memory = limit("reader-bytes") + per_byte * _size(path)
+    memory = limit("reader-bytes")
+    memory += min(per_byte * _size(path), _MOST_SHARES * memory)
     seconds = limit(within) + seconds_per_byte * _size(path)
     request = {
         "place": place,

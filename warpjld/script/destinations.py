@@ -35,4 +35,9 @@ def check_destinations(folder: Path, names: Iterable[str], size: float = 0.0) ->
     there = next(parent for parent in (folder, *folder.parents, Path()) if parent.is_dir())
     free = shutil.disk_usage(there).free
     if size > free:
-        raise InputError(f"about {size / 1e6:,.0f} MB are to be written, {free / 1e6:,.0f} MB are free", path=there)
+        raise InputError(f"about {_stated(size)} are to be written, {_stated(free)} are free", path=there)
+
+
+def _stated(size: float) -> str:
+    """A number of bytes with its unit."""
+    return f"{size / 1e6:,.0f} MB" if size >= 1e7 else f"{size / 1e3:,.0f} kB"

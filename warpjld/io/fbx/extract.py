@@ -9,6 +9,9 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,9 @@ FBX_ARRAYS, FBX_FRAMES = "content.npz", "worlds"
 """Files that are left: arrays by name, and the transforms of an animation, (F, N, 4, 4) float64."""
 Array = NDArray[Any]
 KEPT: list[Any] = []
+_TOGETHER = 500
+"""Frames that one process evaluates: 15 KB remain of each where a scene has 25 joints."""
+_TOO_MUCH = 2  # exit code of a process without memory
 TRANSFORM = ("Lcl Translation", "Lcl Rotation", "Lcl Scaling")
 
 
@@ -195,10 +201,25 @@ def varies(curve: Any) -> bool:
 
 
 def sample(scene: Any, stack: int, times: Array, out: Path) -> None:
-    """Write node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4), as raw float64."""
+    """Write node-to-world transforms per frame, evaluated by ufbx, shape (F, N, 4, 4), as raw float64.
+
+    What the binding leaves behind for each frame ends with a process of its own for every few hundred of them, where
+    processes can be forked.
+    """
     anim = taken(taken(scene.anim_stacks[stack]).anim)
+    out.touch()
+    for start in range(0, len(times), _TOGETHER):
+        some = times[start : start + _TOGETHER]
+        if hasattr(os, "fork") and len(times) > _TOGETHER:
+            forked(partial(evaluate, scene, anim, some, out))
+        else:
+            evaluate(scene, anim, some, out)
+
+
+def evaluate(scene: Any, anim: Any, times: Array, out: Path) -> None:
+    """Append transforms at some times to the file."""
     world = np.tile(np.eye(4), (len(scene.nodes), 1, 1))
-    with out.open("wb") as file:
+    with out.open("ab") as file:
         for time in times:
             shown = scene.evaluate(anim, float(time))
             KEPT.append(shown)
@@ -207,6 +228,31 @@ def sample(scene: Any, stack: int, times: Array, out: Path) -> None:
                 world[n, :3] = np.array(taken(nodes[n]).node_to_world).T
             shown.free()  # frees its memory; the Python objects of its nodes remain
             file.write(world.tobytes())
+
+
+def forked(call: Callable[[], None]) -> None:
+    """Call in a copy of this process, which then ends.
+
+    Raises:
+        MemoryError: It needs more than this process may use.
+        RuntimeError: It raises, or crashes.
+    """
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            call()
+            code = 0
+        except MemoryError:
+            code = _TOO_MUCH
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    code = os.waitstatus_to_exitcode(status)
+    if code == _TOO_MUCH:
+        raise MemoryError
+    if code:
+        raise RuntimeError(f"ufbx cannot evaluate the animation: its process ends with code {code}")
 
 
 def leave_fbx(folder: Path, path: Path, animated: bool, name: str, rate: float) -> dict[str, Any]:

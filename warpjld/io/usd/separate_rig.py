@@ -13,6 +13,7 @@ from warpjld.geometry.surface import Part
 from warpjld.io.source import SourceRig
 from warpjld.io.usd.skin import read_usd_rig
 from warpjld.io.usd.stage import check_usd_content
+from warpjld.io.usd.text_layer import layer_in_parts
 from warpjld.runtime.separate import separately
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -89,7 +90,9 @@ def name_layers(folder: Path, path: Path) -> list[str]:
     from pxr import Sdf, UsdUtils
 
     check_usd_content(path)
+    read = layer_in_parts(path, samples=False)  # OpenUSD takes a layer that exists; numbers name no others
     layers, _, _ = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
+    del read
     return [
         str(one) for one in sorted({Path(one.realPath).resolve() for one in layers if one.realPath} - {path.resolve()})
     ]

@@ -18,6 +18,7 @@ from warpjld.files.archive import check_archive
 from warpjld.files.input_file import open_input, read_bytes
 from warpjld.files.nesting import nesting
 from warpjld.io.usd.crate import MAGIC, check_crate
+from warpjld.io.usd.text_layer import layer_in_parts
 from warpjld.limits import check_limit
 
 __all__ = ["UsdFile", "check_usd_content", "open_usd", "usd_matrices"]
@@ -94,7 +95,7 @@ def open_usd(path: str | Path) -> Iterator[UsdFile]:
         raise MissingExtraError("USD", "usd") from error
     told = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        stage = Usd.Stage.Open(str(path))
+        stage = Usd.Stage.Open(layer_in_parts(path) or str(path))
         broken = stage.GetCompositionErrors()
         told.TakeUncoalescedDiagnostics()
         if broken:
