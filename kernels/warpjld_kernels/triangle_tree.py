@@ -80,6 +80,7 @@ _BY_FRAMES = f"""                    const float* frame = tree.frames.data + {FR
     double best = bound * bound;
     const float at[3] = {{(float)point[0], (float)point[1], (float)point[2]}};
     const float rounded = fabsf(at[0]) + fabsf(at[1]) + fabsf(at[2]);
+    const float slack = 1.2e-7f * rounded;  // of the point itself, rounded to float32
     const bool framed = tree.frames.shape[0] > 0;
     // triangles that may be nearest, and lower bounds of their distances; the nearest is within ``reach``
     int candidate[{CANDIDATES}];
@@ -153,7 +154,7 @@ _BY_FRAMES = f"""                    const float* frame = tree.frames.data + {FR
                         const Floats c = *(const Stored*)(leaf + {WIDTH} * (6 + i) + base);
                         const Floats below = LOWEST(LOWEST(a, b), c) - at[i];
                         const Floats over = at[i] - HIGHEST(HIGHEST(a, b), c);
-                        const Floats gap = HIGHEST(HIGHEST(below, over), Floats(0.0f));
+                        const Floats gap = HIGHEST(HIGHEST(below, over) - slack, Floats(0.0f));
                         outside += gap * gap;
                     }}
                     if (!LANES_OF(outside * 0.999998f <= reach * reach)) continue;
