@@ -7,7 +7,7 @@ from tests.grasp.oracle import signed_distance
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import make_object
-from warpjld.grasp.shapes import ball, box, glass
+from warpjld.grasp.shapes import ball, box, cylinder, glass
 
 
 def open_box():
@@ -89,3 +89,13 @@ def test_each_part_has_its_own() -> None:
     np.testing.assert_allclose(gaps[:, :2], each[:, :2], atol=1e-8)
     assert (gaps[:, 2] == -1.0).all()
     assert np.isinf(gaps[:, 3]).all()
+
+
+def test_a_flat_side_is_as_far_as_its_plane() -> None:
+    """Of two triangles beside an edge the nearer one is found, though rounding a point to float32 moves it by more."""
+    thing, rng, count = cylinder(0.054, 0.108), np.random.default_rng(0), 20_000
+    top = float(np.float32(thing.vertices[:, 1].max()))
+    points = rng.uniform(-0.018, 0.018, size=(count, 3))
+    points[:, 1] = top + rng.uniform(1e-4, 5e-4, size=count)
+    found = NearObject(thing).near(points, 1e-3).distance
+    np.testing.assert_allclose(found, points[:, 1] - top, rtol=0, atol=5e-11)  # rounding of 0.5 mm to float32

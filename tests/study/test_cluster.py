@@ -20,6 +20,7 @@ from tests.study.dice import Dice, edit_trial
 from tests.study.heard import Heard
 from warpjld.errors import InputError, MissingExtraError, WarpjldError
 from warpjld.study import run_study
+from warpjld.study.cluster.session import connected
 
 ray = pytest.importorskip("ray", reason="Ray is not installed")
 
@@ -30,17 +31,8 @@ _RESULTS = ("table.csv", "poses.npz")
 @pytest.fixture(scope="module")
 def workers() -> Iterator[None]:
     """Ray with two workers, for all tests of this file that are not slow."""
-    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
-    ray.init(
-        address="local",
-        num_cpus=2,
-        object_store_memory=100_000_000,
-        include_dashboard=False,
-        log_to_driver=False,
-        logging_level="error",
-    )
-    yield
-    ray.shutdown()
+    with connected("local", 2):
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +117,13 @@ def test_other_versions_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     said = run.ping()
     monkeypatch.setattr(run, "ping", lambda: {**said, "versions": {**said["versions"], "numpy": "9.9"}})
     with pytest.raises(InputError, match=r"has other versions: numpy .* there, 9.9 here; install the same everywhere"):
+        run_study(Dice(trials=2), tmp_path, table="csv", ray="local")
+
+
+@pytest.mark.usefixtures("workers")
+def test_a_worker_that_starts_after_the_program_was_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpjld.study.cluster.nodes.sources", lambda: "as they were")
+    with pytest.raises(WarpjldError, match=r"cannot be run on .*: the program's files have changed since the study"):
         run_study(Dice(trials=2), tmp_path, table="csv", ray="local")
 
 

@@ -199,7 +199,7 @@ def _tree_on(device: Any, things: Sequence[GraspObject]) -> Any:
     from warpjld_kernels.triangle_tree import Tree
 
     tree, built = Tree(), join_trees([build_tree(thing.vertices, thing.faces) for thing in things])
-    kinds = {"root": wp.int32, "child": wp.int32, "boxes": float, "corners": float, "face": wp.int32}
+    kinds = {"root": wp.int32, "child": wp.int32, "boxes": float, "corners": float, "face": wp.int32, "frames": float}
     for name, kind in kinds.items():
         setattr(tree, name, wp.array(getattr(built, name).ravel(), dtype=kind, device=device))
     return tree

@@ -64,18 +64,24 @@ def sources() -> str:
 _ready: dict[str, Experiment] = {}  # experiment by the driver's key, loaded once per process
 
 
-def trial_bytes(key: str, held: list[Any], sent: tuple[Sent, ...], trial: int) -> bytes:
+def trial_bytes(key: str, program: str, held: list[Any], sent: tuple[Sent, ...], trial: int) -> bytes:
     """Run one trial; its packed shard.
 
     Args:
         key: Key of the experiment.
+        program: ``sources`` of the driver.
         held: Reference of the experiment in the object store, in a list so that Ray does not resolve it for every call.
         sent: Its input files.
         trial: Number of the trial.
+
+    Raises:
+        WarpjldError: The program's files have changed since the study began; its bits would be others.
     """
     import ray
 
     if key not in _ready:
+        if sources() != program:
+            raise WarpjldError("the program's files have changed since the study began; start it again")
         experiment: Experiment = ray.get(held[0])
         _ready.clear()
         _ready[key] = experiment.moved({Path(file.path): _placed(file) for file in sent})

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from warpjld.errors import WarpjldError
-from warpjld.runtime.processes import THREAD_VARIABLES
-from warpjld.study.cluster.node import MATCHING, Sent, ping, trial_bytes
+from warpjld.study.cluster.node import MATCHING, Sent, ping, sources, trial_bytes
 
 __all__ = ["ClusterNode", "LostNodeError", "LostWorkerError", "Nodes", "differing"]
 
@@ -66,15 +66,15 @@ class Nodes:
         key: Key of the experiment.
         held: Reference of the experiment in the object store.
         sent: Its input files.
+        environment: Options of tasks that set their environment; see ``connected``.
     """
 
-    def __init__(self, key: str, held: Any, sent: tuple[Sent, ...]) -> None:
+    def __init__(self, key: str, held: Any, sent: tuple[Sent, ...], environment: Mapping[str, Any]) -> None:
         import ray
 
-        variables = dict.fromkeys(THREAD_VARIABLES, "1")
-        how = {"num_cpus": 1, "max_retries": 0, "runtime_env": {"env_vars": variables}}
+        how = {"num_cpus": 1, "max_retries": 0, **environment}
         self._trial, self._ping = ray.remote(**how)(trial_bytes), ray.remote(**how)(ping)
-        self._arguments = (key, [held], sent)
+        self._arguments = (key, sources(), [held], sent)
         self.all: dict[str, ClusterNode] = {}
 
     def new(self) -> list[ClusterNode]:

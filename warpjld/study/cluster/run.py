@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import socket
 import time
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpjld.errors import InputError, MissingExtraError, WarpjldError
+from warpjld.errors import InputError, WarpjldError
 from warpjld.runtime.processes import LIVES
-from warpjld.runtime.threads import cores
 from warpjld.study.cluster.inputs import sent_inputs
 from warpjld.study.cluster.node import ping
 from warpjld.study.cluster.nodes import ClusterNode, LostNodeError, LostWorkerError, Nodes, differing
+from warpjld.study.cluster.session import connected
 from warpjld.study.experiment import Experiment
 from warpjld.study.pool import TrialWork
 from warpjld.study.shards import Shard, Shards
@@ -29,8 +26,6 @@ _LOOK = 1.0  # longest wait for a result before other work is looked at [s]
 _JOINS = 5.0  # interval between looks for new machines [s]
 _PATIENCE = 60.0  # time to wait for a machine when none is left [s]
 _CANARIES = 3  # trials by which a new machine is compared with the others
-_CONNECTS = 10.0  # time for the cluster's head to answer [s]
-_STORE = 200_000_000  # size of Ray's object store on this machine [bytes]; trials are small
 
 
 def run_on_ray(
@@ -69,58 +64,14 @@ def run_on_ray(
         InputError: There is no cluster at the address, or versions differ: names the machine.
         WarpjldError: No machine is left, or a trial cannot be run or written.
     """
-    with _connected(address, processes):
+    with connected(address, processes) as environment:
         import ray
 
         held = ray.put(experiment)
-        nodes = Nodes(uuid.uuid4().hex, held, sent_inputs(experiment.inputs(), ray.put))
+        nodes = Nodes(uuid.uuid4().hex, held, sent_inputs(experiment.inputs(), ray.put), environment)
         study = _Study(experiment, deque(trials), folder, nodes, processes, allow_mixed, done, note)
         study.run()
         return {"address": address, "ray": ray.__version__, "nodes": [node.about() for node in nodes.all.values()]}
-
-
-@contextmanager
-def _connected(address: str, processes: int | None) -> Iterator[None]:
-    """Context with a Ray connection: one that exists already, a new one to a cluster, or a local one."""
-    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    try:
-        import ray
-    except ImportError:
-        raise MissingExtraError("a study on a cluster", "ray") from None
-    if ray.is_initialized():
-        yield
-        return
-    quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
-    try:
-        if address == "local":
-            own = {"num_cpus": processes or cores(), "object_store_memory": _STORE, "include_dashboard": False}
-            ray.init(address="local", **own, **quiet)
-        else:
-            _listens(address)
-            ray.init(address=address, **quiet)
-    except (ConnectionError, ValueError, RuntimeError, OSError) as error:
-        lines = str(error).strip().splitlines() or [type(error).__name__]
-        raise InputError(f"no Ray cluster at '{address}': {lines[0]}") from None
-    try:
-        yield
-    finally:
-        ray.shutdown()
-
-
-def _listens(address: str) -> None:
-    """Check that something listens at the address, since Ray itself would wait for minutes.
-
-    Raises:
-        OSError: Nothing listens there.
-        ValueError: Not an address.
-    """
-    if address == "auto":
-        return
-    host, colon, port = address.rpartition(":")
-    if "://" in address or not colon or not port.isdecimal():
-        raise ValueError("want HOST:PORT of its head, as ray start says it, or auto, or local")
-    socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECTS).close()
 
 
 class _Study:
