@@ -37,7 +37,8 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
    *Fixed-point phase*, iterations 1–8: full steps, λ updated after each, and the active set frozen during a solve:
    points with λ_n > 0 are active in (2) whatever their gap, and the solve decides whether they open (primal–dual active
    set strategy: Hüeber & Wohlmuth 2005). λ_n of the previous solve bounds friction in (3), so that each solve is a
-   convex problem (Tresca friction).
+   convex problem (Tresca friction). Friction acts on a point from its second iteration with pressure on; if it has slid
+   far without friction until then, and no body is held by friction alone, it begins by sliding, else by sticking.
 5. *Alternating phase*, afterwards: λ is updated only if the active set did not change; otherwise a line search along Δu
    (by work, or by the residual if E is present) settles the active set.
    In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points

@@ -54,6 +54,7 @@ class LoadStep:
         loads: Loads at ``time``.
         allowed: Fraction of the initial overlap that is still admissible at ``time``.
         inertia: Inertia in an implicit Euler step of that length; None: a quasi-static step.
+        held: Whether Dirichlet conditions, or inertia, resist every rigid motion of every body.
     """
 
     before: float
@@ -62,6 +63,7 @@ class LoadStep:
     loads: Loads
     allowed: float
     inertia: Inertia | None = None
+    held: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,15 +223,17 @@ class ContactSystem:
         decides: ActiveSet,
         *,
         ended: bool = False,
+        slides: bool = False,
     ) -> list[ContactState]:
-        """Contact states after a move (3N,) with predicted tractions (multiplier update); ``ended``: of a step."""
+        """Contact states after a move (3N,) with predicted tractions (multiplier update); ``ended``: of a step;
+        ``slides``: as in ``update_multipliers``."""
         out = []
         for k, (slip, s, p, t) in enumerate(
             zip(self._slips(contact, move), states, contact.points, predicted, strict=True)
         ):
             now, penalty = contact.tractions[k], self._penalty(k, p, s)
             pair = self.interfaces[k].pair
-            new = update_multipliers(pair, s, p, t, slip, penalty, now.active, decides)
+            new = update_multipliers(pair, s, p, t, slip, penalty, now.active, decides, slides=slides)
             new = elastic_multipliers(pair, s, new, ended=ended)
             out.append(replace(new, stiffening=self._stiffer(k, new, p, now, t)))
         return out

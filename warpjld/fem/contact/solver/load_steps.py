@@ -132,7 +132,9 @@ class LoadSteps:
         known = self.prescribed
         now = known(time) if callable(known) else known.scaled(share)
         loads = self.loads(time) if callable(self.loads) else self.loads.scaled(share)
-        return LoadStep(before, time, now, loads, self.allowed(time), self._inertia(before, time))
+        inertia = self._inertia(before, time)
+        held = inertia is not None or not self.motion.leaves_free(now)
+        return LoadStep(before, time, now, loads, self.allowed(time), inertia, held)
 
     def _inertia(self, before: float, time: float) -> Inertia | None:
         """Inertia in a step between two times."""
@@ -142,7 +144,7 @@ class LoadSteps:
 
     def _leaves_free(self, step: LoadStep) -> bool:
         """Whether nothing but contact holds a body in a step."""
-        return step.inertia is None and self.motion.leaves_free(step.prescribed)
+        return not step.held
 
     def allowed(self, time: float) -> float:
         """Share of the overlap at the start that is still allowed at a time."""

@@ -254,7 +254,8 @@ class NewtonState:
         same = same_active_set(self.contact.tractions, predicted)
         self._same_for = self._same_for + 1 if same else 0
         if not alternating or same:
-            self.states = self.system.updated(self.states, self.contact, predicted, move, decides)
+            slides = self.step.held  # the slip of a body that friction has to hold is not known without friction
+            self.states = self.system.updated(self.states, self.contact, predicted, move, decides, slides=slides)
         points, last = self._points(predicted), alternating or self.turn + 1 >= _FIXED_POINT
         sticks = any((t.active & t.sticking).any() for t in predicted)
         if self.contact.coupled and sticks and length < _SHORT:
