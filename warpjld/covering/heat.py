@@ -27,6 +27,7 @@ __all__ = [
     "cotangent_laplacian",
     "diffused",
     "solve_diffusion",
+    "surface_laplacian",
     "uniform_laplacian",
 ]
 
@@ -65,8 +66,15 @@ def conducting_laplacian(
     return _cotangents(vertices, faces, lambda i, j: corner * (conductivity[i] + conductivity[j]) / 2.0)
 
 
+def surface_laplacian(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """As :func:`cotangent_laplacian`, of the surface as it is: without the conductivity around saddle vertices."""
+    return _cotangents(vertices, faces, lambda i, j: 1.0)
+
+
 def _cotangents(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: Callable[[NDArray, NDArray], NDArray]
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: Callable[[NDArray, NDArray], NDArray | float]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
     """Cotangent Laplacian and vertex areas; ``conductivity(i, j)`` is that of the edges i to j of all triangles."""
     count = len(vertices)
