@@ -16,7 +16,7 @@ from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.mesh.embedding import Embedding
-from warpjld.geometry.edge_distance import edge_distance
+from warpjld.geometry.edge_distance import edge_distance, edge_graph
 from warpjld.geometry.surface import Surface
 from warpjld.rig import Rig
 from warpjld.skeleton.segments import segment_joints
@@ -104,7 +104,7 @@ def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spaci
     if not inside.any():
         raise InputError(f"no skin belongs to {', '.join(segments)}")
     margin = _MARGIN * spacing
-    away = edge_distance(surface.vertices, surface.faces, inside, margin)
+    away = edge_distance(edge_graph(surface.vertices, surface.faces), inside, margin)
     chosen = np.flatnonzero(away <= margin)
     share = np.clip(1.0 - away / margin, 0.0, 1.0)
     number = np.full(len(surface.vertices), -1, np.int32)
