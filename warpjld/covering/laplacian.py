@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 else:
     sp = lazy_module("scipy.sparse")
 
-__all__ = ["conducting_laplacian", "cotangent_laplacian", "cotangents", "uniform_laplacian"]
+__all__ = ["conducting_laplacian", "cotangent_laplacian", "cotangents", "surface_laplacian", "uniform_laplacian"]
 
 
 def cotangent_laplacian(
@@ -42,10 +42,28 @@ def conducting_laplacian(
     return cotangents(vertices, faces, lambda i, j: corner * (conductivity[i] + conductivity[j]) / 2.0)
 
 
-def cotangents(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], conductivity: Callable[[NDArray, NDArray], NDArray]
+def surface_laplacian(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
 ) -> tuple[sp.csr_array, NDArray[np.float64]]:
-    """Cotangent Laplacian and vertex areas; ``conductivity(i, j)`` is that of the edges i to j of all triangles."""
+    """Cotangent Laplacian of the surface as it is, shape (V, V), and barycentric vertex areas, shape (V,).
+
+    Weights of edges are clamped at 0, not those of their corners: where triangles are Delaunay, fields that are linear
+    in a plane have none, however unequal the triangles are. Without the conductivity around saddle vertices.
+    """
+    found, area = cotangents(vertices, faces, lambda i, j: 1.0, least=-1e3)
+    pairs = found.tocoo()
+    rows, columns = pairs.coords
+    return _laplacian(rows, columns, np.maximum(-pairs.data, 0.0), len(vertices)), area
+
+
+def cotangents(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    conductivity: Callable[[NDArray, NDArray], NDArray | float],
+    least: float = 1e-3,
+) -> tuple[sp.csr_array, NDArray[np.float64]]:
+    """Cotangent Laplacian and vertex areas; ``conductivity(i, j)`` is that of the edges i to j of all triangles,
+    ``least`` the smallest cotangent of a corner."""
     count = len(vertices)
     rows, columns, values = [], [], []
     area = np.zeros(count)
@@ -53,7 +71,7 @@ def cotangents(
         apex, i, j = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
         u, v = vertices[i] - vertices[apex], vertices[j] - vertices[apex]
         twice = np.linalg.norm(np.cross(u, v), axis=1)
-        cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice, 1e-30), 1e-3, 1e3) / 2.0
+        cotangent = np.clip((u * v).sum(axis=1) / np.maximum(twice, 1e-30), least, 1e3) / 2.0
         rows += [i, j]
         columns += [j, i]
         values += [cotangent * conductivity(i, j)] * 2

@@ -16,6 +16,7 @@ from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.fem.hand.flesh_hand import FleshHand
 from warpjld.fem.mesh.embedding import Embedding
+from warpjld.geometry.edge_distance import edge_distance, edge_graph
 from warpjld.geometry.surface import Surface
 from warpjld.rig import Rig
 from warpjld.skeleton.segments import segment_joints
@@ -103,7 +104,7 @@ def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spaci
     if not inside.any():
         raise InputError(f"no skin belongs to {', '.join(segments)}")
     margin = _MARGIN * spacing
-    away = _edge_distance(surface, inside, margin)
+    away = edge_distance(edge_graph(surface.vertices, surface.faces), inside, margin)
     chosen = np.flatnonzero(away <= margin)
     share = np.clip(1.0 - away / margin, 0.0, 1.0)
     number = np.full(len(surface.vertices), -1, np.int32)
@@ -117,16 +118,3 @@ def segment_surface(rig: Rig, covering: Covering, segments: Sequence[str], spaci
     small = replace(rig, surface=part, skin=None, rigid=None if rig.rigid is None else rig.rigid[chosen])
     share[np.setdiff1d(np.arange(len(share)), chosen)] = 0.0
     return SegmentSurface(small, surface, chosen, share * share * (3.0 - 2.0 * share), frozenset(joints))
-
-
-def _edge_distance(surface: Surface, start: NDArray[np.bool_], limit: float) -> NDArray[np.float64]:
-    """Distance along edges to the nearest vertex of a mask [m], infinite beyond ``limit``, shape (V,)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import dijkstra
-
-    edges = np.unique(np.sort(surface.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    length = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
-    count = len(surface.vertices)
-    graph = coo_array((length + 1e-12, (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
-    distance = dijkstra(graph, directed=False, indices=np.flatnonzero(start), limit=limit, min_only=True)
-    return np.asarray(distance, np.float64)

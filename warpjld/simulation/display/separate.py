@@ -2,7 +2,7 @@
 
 Contact is enforced on average over element faces. Visible surfaces are finer, and between nodes they overlap or gape by
 a fraction of an element. Overlaps are removed by moving both surfaces in inverse proportion to their stiffness, and two
-parts of one hand by half each.
+parts of one hand by half each. Skin that passes through itself anywhere is drawn back first (``uncross``).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.simulation.bodies.skin_parts import SkinParts
 from warpjld.simulation.display.overlap import Overlap, SurfacePart, overlap_of, self_overlaps
+from warpjld.simulation.display.uncross import SkinCrossings, uncrossed
 
 __all__ = ["SeparatedSurfaces", "VisibleSurface", "separate_surfaces"]
 
@@ -35,6 +36,8 @@ class VisibleSurface:
         most: Largest displacement of a vertex [m]: a fraction of an element.
         parts: Parts of it that may overlap one another; None if it has none.
         pressing: Mask of vertices whose overlap with other parts is resolved by contact, shape (V,); None: all.
+        crossings: What finds crossings of the surface with itself; None if they are not removed.
+        covered: Skin as the covering deforms it [m], shape (V, 3); None for objects.
     """
 
     vertices: NDArray[np.float64]
@@ -43,6 +46,8 @@ class VisibleSurface:
     most: float
     parts: SkinParts | None = None
     pressing: NDArray[np.bool_] | None = None
+    crossings: SkinCrossings | None = None
+    covered: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +90,7 @@ def separate_surfaces(
     pairs = [(one, other) for k, one in enumerate(names) for other in names[k + 1 :]]
     pairs = [pair for pair in pairs if bodies[pair[0]].near(bodies[pair[1]])]
     for body in bodies.values():
+        body.uncross()
         body.separate_parts()
     for one, other in pairs:
         a, b = bodies[one], bodies[other]
@@ -99,6 +105,8 @@ def separate_surfaces(
     for body in bodies.values():
         for obstacle in obstacles.values():
             body.move_out(body.inside(obstacle, time), 1.0)
+    for body in bodies.values():
+        body.uncross()
     inside: dict[tuple[SurfacePart, SurfacePart], Overlap] = {}
     for one, other in pairs:
         inside[SurfacePart(one), SurfacePart(other)] = bodies[other].containing(bodies[one])
@@ -160,6 +168,14 @@ class _MovingSurface:
         if self._between_parts is None:
             self._between_parts = {} if parts is None else self_overlaps(parts, self.at, self._normals())
         return self._between_parts
+
+    def uncross(self) -> None:
+        """Draw skin back that passes through itself."""
+        shown = self.shown
+        if shown.crossings is not None and shown.covered is not None:
+            at = uncrossed(shown.crossings, self.at, shown.covered, shown.most)
+            self._facets_moved = self._facets_moved or at is not self.at
+            self.at, self._between_parts = at, None
 
     def separate_parts(self) -> None:
         """Move overlapping parts apart by half each, where contact resolves their overlap."""

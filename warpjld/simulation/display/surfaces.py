@@ -16,6 +16,7 @@ from warpjld.simulation.display.pressure_map import PressureMap, pressure_map
 from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 from warpjld.simulation.display.separate import SeparatedSurfaces, VisibleSurface, separate_surfaces
 from warpjld.simulation.display.smooth import SurfaceSmoother
+from warpjld.simulation.display.uncross import SkinCrossings
 from warpjld.simulation.solve.digit_loads import CRUSHING
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 
@@ -123,7 +124,16 @@ class DeformedSurfaces:
             at = body.deformed(moved[self.model.spans[name]], covered)
             if covered is not None:
                 at = covered + self._smoothers[name].of(at - covered)
-            out[name] = VisibleSurface(at, body.triangles, body.modulus, self.most(name), body.parts, body.pressing)
+            out[name] = VisibleSurface(
+                at,
+                body.triangles,
+                body.modulus,
+                self.most(name),
+                body.parts,
+                body.pressing,
+                self._crossings.get(name),
+                covered,
+            )
         return out
 
     @cached_property
@@ -146,6 +156,21 @@ class DeformedSurfaces:
         return {
             hand.name: SurfaceSmoother(hand.surface, hand.triangles, element_edge(hand.mesh, hand.faces))
             for hand in self.model.hands
+        }
+
+    @cached_property
+    def _crossings(self) -> dict[str, SkinCrossings]:
+        """What finds crossings of the skin of actors whose flesh touches itself, by name."""
+        return {
+            hand.name: SkinCrossings(
+                hand.triangles,
+                hand.hand.surface.vertices,
+                element_edge(hand.mesh, hand.faces),
+                hand.embedded & (hand.shape.blend > 0.0),
+                self._smoothers[hand.name],
+            )
+            for hand in self.model.hands
+            if hand.touches_itself
         }
 
     @cached_property

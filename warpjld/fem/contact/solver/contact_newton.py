@@ -138,7 +138,8 @@ class ContactNewton:
             state.linearise()
             done = self._solved(state, unconstrained)
             if done.status in (SolveStatus.INDEFINITE, SolveStatus.NOT_FINITE):
-                return done.status, None
+                status, self.failure = unconstrained.failure(self._system.interfaces, state.contact)
+                return status if status is SolveStatus.UNHELD else done.status, None
             if self._advance(state, done.x + state.jump, unconstrained) == 0.0:
                 if not self._damping.more():
                     return SolveStatus.INVERTED, None

@@ -13,6 +13,7 @@ from warpjld.fem.contact.law.contact_state import ContactState
 from warpjld.fem.contact.solver.contact_system import GRAZING, IMMOBILE, ContactForces, mobility
 from warpjld.fem.load.prescribed import Prescribed, free_motions, rigid_modes
 from warpjld.fem.solver.krylov import SolveStatus
+from warpjld.geometry.coincident import connected_parts
 
 __all__ = ["UnconstrainedBodies", "blocked"]
 
@@ -46,24 +47,52 @@ class UnconstrainedBodies:
         return bool(self._bodies)
 
     def falling(self, contact: ContactForces) -> Mask:
-        """Mask of the nodes of unconstrained bodies without active contact, shape (N,)."""
+        """Mask of the nodes of unconstrained bodies that touch nothing but one another, shape (N,)."""
         out = np.zeros(len(self._mesh.nodes), dtype=bool)
-        if self._bodies:
-            touched = np.zeros(len(out), dtype=bool)
-            for p, r in zip(contact.points, contact.tractions, strict=True):
-                touched[p.weights[np.flatnonzero(r.active)].indices] = True
-            for nodes in self._bodies:
-                out[nodes] = not touched[nodes].any()
+        for group in self._adrift(contact):
+            out[np.concatenate([self._bodies[k] for k in group])] = True
         return out
+
+    def _adrift(self, contact: ContactForces) -> list[list[int]]:
+        """Groups of unconstrained bodies that active contact, or bonds, connect to nothing but one another."""
+        count = len(self._bodies)
+        if not count:
+            return []
+        label = np.full(len(self._mesh.nodes), count)  # the last one stands for all that is held, and for obstacles
+        for k, nodes in enumerate(self._bodies):
+            label[nodes] = k
+        links = []
+        for p, r in zip(contact.points, contact.tractions, strict=True):
+            rows = np.flatnonzero(r.active)
+            if not len(rows):
+                continue
+            touched = p.weights[rows].tocoo()
+            row, column = touched.coords
+            met = np.zeros((len(rows), count + 1), dtype=bool)
+            met[row[touched.data != 0.0], label[column[touched.data != 0.0]]] = True
+            met[np.asarray(touched.sum(axis=1)).ravel() > 0.5, count] = True  # between meshes weights sum to 0
+            first = met.argmax(axis=1)
+            links += [(int(one), k) for k in range(count + 1) for one in np.unique(first[met[:, k]])]
+        part = connected_parts(np.array(links, np.int64).reshape(-1, 2), count + 1)
+        alone = [k for k in range(count) if part[k] != part[count]]
+        return [[k for k in alone if part[k] == one] for one in dict.fromkeys(int(part[k]) for k in alone)]
+
+    def _name(self, body: int) -> str:
+        """Name of an unconstrained body's first region, in quotes."""
+        mine = np.zeros(len(self._mesh.nodes), dtype=bool)
+        mine[self._bodies[body]] = True
+        element = int(np.flatnonzero(mine[self._mesh.elements[:, 0]])[0])
+        return f"'{self._mesh.region_names[self._mesh.regions[element]]}'"
 
     def failure(self, interfaces: list[Interface], contact: ContactForces) -> tuple[SolveStatus, str]:
         """Reason for a failure: an unconstrained body without contact, or one that slides at all its contacts."""
-        for nodes, held in zip(self._bodies, self._held, strict=True):
+        for group in self._adrift(contact):
+            if len(group) > 1 and not any(self._held[k] for k in group):
+                return SolveStatus.UNHELD, f"nothing holds {' and '.join(self._name(k) for k in group)}"
+        for k, (nodes, held) in enumerate(zip(self._bodies, self._held, strict=True)):
             mine = np.zeros(len(self._mesh.nodes), dtype=bool)
             mine[nodes] = True
-            element = int(np.flatnonzero(mine[self._mesh.elements[:, 0]])[0])
-            what = f"'{self._mesh.region_names[self._mesh.regions[element]]}'"
-            touching = []
+            what, touching = self._name(k), []
             for interface, p, r in zip(interfaces, contact.points, contact.tractions, strict=True):
                 rows = np.flatnonzero(r.active)
                 rows = rows[(p.weights[rows] @ mine.astype(float) != 0.0)] if len(rows) else rows
