@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from tests.covering.tube import tube, tube_skeleton
 from warpjld.covering import bind, heat
 from warpjld.covering.domains import domains_from_geometry
+from warpjld.covering.laplacian import cotangent_laplacian
 from warpjld.covering.operators import fans
 from warpjld.covering.paper_places import PaperPlaces, paper_places
 from warpjld.covering.parameters import default_parameters
@@ -122,7 +123,7 @@ def test_multigrid_does_not_depend_on_what_was_drawn_before(monkeypatch: pytest.
 
 def test_heat_does_not_depend_on_the_order_its_equations_are_solved_in(built: Rig) -> None:
     hand = built.surface
-    laplacian, area = heat.cotangent_laplacian(hand.vertices, hand.faces, np.full(len(hand.vertices), 0.01))
+    laplacian, area = cotangent_laplacian(hand.vertices, hand.faces, np.full(len(hand.vertices), 0.01))
     right = np.random.default_rng(0).random((len(area), 3)) * area[:, None]
     order = spatial_order(hand.vertices)
     np.testing.assert_array_equal(np.sort(order), np.arange(len(area)))
