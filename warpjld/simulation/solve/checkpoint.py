@@ -172,6 +172,9 @@ def load_checkpoint(path: Path) -> Checkpoint:
 def _read(file: Any) -> Checkpoint:
     columns = {name: file[f"frames.{name}"] for name in _names(SolvedFrame)}
     nodal = {name: file[f"frames.nodal_contact.{name}"] for name in _names(NodalContact)}
+    for name, array in [*columns.items(), *nodal.items()]:
+        if array.shape[:1] != columns["frame"].shape:
+            raise InputError(f"{name}: want one a frame, {columns['frame'].size}, got an array of shape {array.shape}")
     frames = []
     for k in range(len(columns["frame"])):
         one = {name: array[k] for name, array in columns.items()}
