@@ -38,8 +38,8 @@ device_of_study: Decorator = click.option(
     "--device",
     default="cpu",
     show_default=True,
-    help="Where hands close, and distances to objects and the skin are computed: cpu, cuda:0, …; distances to the skin, "
-    "contacts, force closure and [contact] stay on the CPU.",
+    help="Where hands close, and distances to objects and the skin are computed: cpu, cuda:0, …; distances to the "
+    "skin, contacts, force closure and [contact] stay on the CPU.",
 )
 device_of_script: Decorator = click.option(
     "--device",
