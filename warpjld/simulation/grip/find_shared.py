@@ -55,7 +55,7 @@ def find_shared(
             tell("; ".join(f"{d.rpartition('.')[2]} {math.degrees(g):.2f}° {f:.3g} N {s:.1%}" for d, g, f, s in each))
         return pressed
 
-    low, high = (np.clip(end, -request.most, request.most) for end in squeeze.range)
+    low, high = squeeze.range(request.most)
     found = share_force(press, low, high, strengths, request.force, start=_START)
     instant = squeeze.known(found.grips)
     effort = squeeze.effort(found.grips, instant) if instant is not None and instant.touches else None
