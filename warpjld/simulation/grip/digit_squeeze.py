@@ -46,6 +46,8 @@ class DigitSqueeze:
         joints: Joints of each.
         wanted: Force of each digit of which its share is measured [N], shape (D,); None: shares are those of muscles.
         solved: Equilibria solved so far, beside the initial one.
+        bone_room: Digit, such as ``index`` → largest closing at which its bones are outside every object [rad], where
+            that is below the largest that ``range`` was asked for.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class DigitSqueeze:
         self._bounds = hand.bones.skeleton.limits[:, FLEXION]
         self._known: list[tuple[Array, ContactSolution]] = [(np.zeros(len(self.digits)), after)]
         self.solved = 0
+        self.bone_room: dict[str, float] = {}
 
     def range(self, most: float) -> tuple[Array, Array]:
         """Closings at which the last joint of each digit reaches its limit, or its bone an object [rad], each (D,).
@@ -75,7 +78,9 @@ class DigitSqueeze:
         low = [float((self._bounds[one, 0] - now[one]).min()) for one in self.joints]
         high = [min(most, float((self._bounds[one, 1] - now[one]).max())) for one in self.joints]
         count = len(self.digits)
-        room = bone_room(self._model, self._hand, self._time, lambda by: self.angles(np.full(count, by)), max(high))
+        self.bone_room = room = bone_room(
+            self._model, self._hand, self._time, lambda by: self.angles(np.full(count, by)), max(high)
+        )
         high = [min(one, room.get(name.rpartition(".")[2], most)) for name, one in zip(self.digits, high, strict=True)]
         return np.clip(low, -most, 0.0), np.maximum(high, 0.0)
 
