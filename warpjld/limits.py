@@ -39,6 +39,7 @@ LIMITS = {
     "members": Limit(10_000, "members", "an archive"),
     "vertices": Limit(5_000_000, "vertices", "a surface"),
     "faces": Limit(10_000_000, "triangles", "a surface"),
+    "pairs": Limit(20_000_000, "pairs", "points of a surface that nearly coincide"),
     "nodes": Limit(100_000, "nodes", "a scene"),
     "joints": Limit(1_024, "joints", "a skeleton"),
     "frames": Limit(2_000_000, "frames", "a motion or a scene"),

@@ -47,3 +47,12 @@ def test_commands_refuse_to_write_over_a_rig(
     assert "it is not written over" in capsys.readouterr().err
     assert (tmp_path / "a.glb").read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.glb", "a.jld"]
+
+
+def test_what_is_in_the_way_is_said_before(tmp_path: Path) -> None:
+    (tmp_path / "a.npz").mkdir()
+    (tmp_path / "b").write_text("")
+    with pytest.raises(InputError, match=r"a\.npz: a folder stands where this file should go"):
+        check_outputs([tmp_path / "new" / "c.npz", tmp_path / "a.npz"], [])
+    with pytest.raises(InputError, match="b: is a file; want a folder to write into"):
+        check_outputs([tmp_path / "b" / "c" / "a.npz"], [])

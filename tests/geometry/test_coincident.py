@@ -10,7 +10,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from warpjld.geometry.coincident import close_pairs, connected_parts
+from warpjld.errors import InputError
+from warpjld.geometry.coincident import close_links, close_pairs, connected_parts
 
 _seeds = st.integers(0, 2**32 - 1)
 
@@ -41,6 +42,29 @@ def test_twice_the_same_points_in_a_plane(direction: list[float]) -> None:
     points -= (points @ normal)[:, None] * normal / (normal @ normal)  # a plane, all of which is alike along its normal
     points = np.concatenate([points, points[:50]])
     assert _as_set(close_pairs(points, 1e-9)) == {(k, 400 + k) for k in range(50)}
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(_seeds, st.integers(1, 60), st.integers(1, 4))
+def test_links_connect_what_all_pairs_connect(seed: int, count: int, cells: int) -> None:
+    random = np.random.default_rng(seed)
+    points = random.integers(0, cells, (count, 3)) + random.choice([0.0, 0.0, 2e-4, 9e-4], (count, 3))
+    links, pairs = close_links(points, 1e-3), close_pairs(points, 1e-3)
+    assert _as_set(links) <= _as_set(pairs)
+    np.testing.assert_array_equal(connected_parts(links, count), connected_parts(pairs, count))
+
+
+def test_many_points_in_one_place_are_few_links_and_no_more_pairs_than_the_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    places = np.random.default_rng(0).normal(size=(20, 3))
+    points = np.tile(places, (5_000, 1))
+    links = close_links(points, 1e-6)
+    assert len(links) == len(points) - len(places)
+    np.testing.assert_array_equal(connected_parts(links, len(points)), np.arange(len(points)) % 20)
+    monkeypatch.setenv("WARPJLD_LIMIT_PAIRS", "1000000")
+    with pytest.raises(InputError, match=r"the limit is 1,000,000 .*pairs="):
+        close_pairs(points, 1e-6)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)

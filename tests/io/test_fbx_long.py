@@ -26,6 +26,17 @@ def test_all_frames_of_several_processes_are_there_in_their_order(tmp_path: Path
     np.testing.assert_allclose(together[..., :3, 3], worlds[..., :3, 3], atol=1e-5)
 
 
+def test_memory_that_ufbx_does_not_get_is_no_fault_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import ufbx
+
+    def refuses(path: str, **options: object) -> None:
+        raise ufbx.UfbxError("Out of memory: result")  # what it says within a limit on the address space
+
+    monkeypatch.setattr(ufbx, "load_file", refuses)
+    with pytest.raises(MemoryError):
+        extract.load(tmp_path / "x.fbx")
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 def test_what_goes_wrong_in_one_of_them_is_told(tmp_path: Path) -> None:
     def raises(error: BaseException) -> None:

@@ -21,6 +21,7 @@ from warpjld.simulation.fall.time_stepping import step_bodies
 from warpjld.simulation.recorded import RecordedAnimation, RecordedObject
 from warpjld.simulation.simulate import Simulation
 from warpjld.simulation.solve.falling import falling_names, follow_falls
+from warpjld.simulation.solve.falling_stage import FallingStage
 from warpjld.simulation.specification import ContactSpecification, ObjectMaterial, SolveSpecification
 
 G = np.array([0.0, -9.81, 0.0])
@@ -170,6 +171,34 @@ def test_a_script_of_objects_alone() -> None:
     assert found.verdict.status == "CONVERGED"
     assert "BLOCK is held by nothing: it falls from frame 0 on, and comes to rest on TABLE" in found.verdict.text
     assert found.force("BLOCK")[-1] == pytest.approx([0.0, 1000.0 * 0.03**3 * 9.81, 0.0], rel=1e-3, abs=1e-4)
+
+
+def test_an_interrupted_fall_keeps_its_whole_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (
+        "OBJECT TABLE BOX 0.1 0.02 0.1 AT 0 -0.01 0\nOBJECT BLOCK BOX 0.03 0.03 0.03 AT 0 0.5 0\n"
+        "PHYSICAL BLOCK YOUNG 200000 ELEMENT 0.03\nGRAVITY 0 -9.81 0\nFRAMES 0 9\nPRESS 0 9\n"
+    )
+    step, last = FallingStage._frame, 9.0
+
+    def until(stage: FallingStage, before: float, after: float, solids: dict[str, Obstacle]) -> None:
+        step(stage, before, after, solids)  # the frame in which Ctrl-C comes has moved what falls
+        if after > last:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(FallingStage, "_frame", until)
+    whole, last = run(text)[1], 4.0
+    found = run(text)[1]
+    assert found.solved.interrupted
+    assert found.verdict.status == "STOPPED"
+    assert found.verdict.text.startswith("interrupted after frame 4; BLOCK is held by nothing: it falls from frame 0")
+    for frame in (0, 2, 4):
+        shown, wanted = (one.surfaces.object("BLOCK", frame) for one in (found, whole))
+        assert shown is not None
+        np.testing.assert_array_equal(shown, wanted)
+    assert not np.array_equal(found.surfaces.object("BLOCK", 9), whole.surfaces.object("BLOCK", 9))
+    last = 0.0
+    with pytest.raises(KeyboardInterrupt):
+        run(text)
 
 
 def test_what_is_let_go_falls() -> None:

@@ -28,6 +28,14 @@ _ROOT = Path(__file__).resolve().parents[2]
 _RESULTS = ("table.csv", "poses.npz")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def undrawn() -> Iterator[None]:
+    """Studies without summaries, whose drawing would take a third of these tests' processor time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("warpjld.study.run.write_summary", lambda *how: [])
+        yield
+
+
 @pytest.fixture(scope="module")
 def workers() -> Iterator[None]:
     """Ray with two workers, for all tests of this file that are not slow."""

@@ -38,14 +38,15 @@ device_of_study: Decorator = click.option(
     "--device",
     default="cpu",
     show_default=True,
-    help="Where the skin of closed hands is computed: cpu, cuda:0, …; closing, distances, contacts, force closure and "
-    "[contact] stay on the CPU.",
+    help="Where hands close, and distances to objects and the skin are computed: cpu, cuda:0, …; distances to the "
+    "skin, contacts, force closure and [contact] stay on the CPU.",
 )
 device_of_script: Decorator = click.option(
     "--device",
     default="cpu",
     show_default=True,
-    help="Where the skin and flexion searches are computed: cpu, cuda:0, …; GRASP, TOUCH and PRESS stay on the CPU.",
+    help="Where the skin, flexion searches, closing hands and distances to objects are computed: cpu, cuda:0, …; "
+    "judging grasps, TOUCH and PRESS stay on the CPU.",
 )
 threads: Decorator = click.option(
     "--threads", type=click.IntRange(min=1), help="CPU threads; chosen automatically by default."

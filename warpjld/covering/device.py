@@ -12,7 +12,7 @@ from warpjld.errors import InputError
 if TYPE_CHECKING:
     import warp as wp
 
-__all__ = ["array_on", "checked_device", "parameters_on"]
+__all__ = ["array_on", "checked_device", "parameters_on", "shared_on"]
 
 
 def checked_device(name: str) -> wp.Device:
@@ -37,6 +37,13 @@ def parameters_on(device: wp.Device, parameters: Parameters) -> Any:
     for name in ("inflation", "proximity", "muscle", "peak", "exponents", "palm"):
         setattr(out, name, array_on(device, getattr(parameters, name), float))
     return out
+
+
+def shared_on(device: Any, values: np.ndarray, kind: Any) -> Any:
+    """A Warp array of values: on the CPU their own memory, elsewhere a copy; its ``numpy()`` has what kernels wrote."""
+    import warp as wp
+
+    return wp.array(values, dtype=kind, device=device, copy=False)
 
 
 def array_on(device: Any, values: np.ndarray, kind: Any, *, requires_grad: bool = False) -> Any:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["close_pairs", "connected_parts"]
+from warpjld.limits import check_limit
+
+__all__ = ["close_links", "close_pairs", "connected_parts"]
 
 # a generic direction, along which only points that are near each other have nearly equal coordinates in most models
 _ASKEW = np.array([0.5257, 0.6180, 0.5846])
@@ -24,6 +26,9 @@ def close_pairs(points: NDArray[np.float64], distance: float) -> NDArray[np.int6
     Args:
         points: Positions, shape (n, 3).
         distance: Largest distance; should be small compared with the distances of most points.
+
+    Raises:
+        InputError: There are more than the limit ``pairs``, as where thousands of points lie in one place.
     """
     along = points @ (_ASKEW / np.linalg.norm(_ASKEW))
     order = np.argsort(along, kind="stable")
@@ -31,7 +36,7 @@ def close_pairs(points: NDArray[np.float64], distance: float) -> NDArray[np.int6
     reach = distance + _ROUNDING * float(np.abs(points).max(initial=0.0))
     first = np.arange(len(points))
     found = []
-    step = 0
+    step = count = 0
     while first.size:
         step += 1
         first = first[: np.searchsorted(first, len(points) - step)]
@@ -39,7 +44,30 @@ def close_pairs(points: NDArray[np.float64], distance: float) -> NDArray[np.int6
         pairs = np.column_stack([order[first], order[first + step]])
         apart = points[pairs[:, 0]] - points[pairs[:, 1]]
         found.append(pairs[(apart * apart).sum(axis=1) <= distance * distance])
+        count += len(found[-1])
+        check_limit("pairs", count)
     return np.sort(np.concatenate(found), axis=1) if found else np.zeros((0, 2), dtype=np.int64)
+
+
+def close_links(points: NDArray[np.float64], distance: float) -> NDArray[np.int64]:
+    """Pairs of points within a distance of each other that connect what all such pairs connect, shape (m, 2).
+
+    Points in exactly the same place, as the corners of many faces are, form a chain: their pairs would be as many as
+    the square of their number.
+
+    Args:
+        points: Positions, shape (n, 3).
+        distance: Largest distance; should be small compared with the distances of most places.
+
+    Raises:
+        InputError: There are more than the limit ``pairs`` between different places.
+    """
+    order = np.lexsort(points.T)
+    placed = points[order]
+    same = (placed[1:] == placed[:-1]).all(axis=1)
+    chains = np.column_stack([order[:-1][same], order[1:][same]])
+    different = order[np.concatenate([np.ones(min(len(order), 1), dtype=bool), ~same])]
+    return np.concatenate([chains, different[close_pairs(points[different], distance)]])
 
 
 def connected_parts(links: NDArray[np.integer], count: int) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpjld.errors import InputError
-from warpjld.geometry.coincident import close_pairs, connected_parts
+from warpjld.geometry.coincident import close_links, connected_parts
 from warpjld.geometry.lengths import check_reach
 
 __all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
@@ -183,7 +183,7 @@ def weld_surface(
     owner = np.arange(len(points))
     for part in parts:
         inside = points[part.vertices]
-        pairs = close_pairs(inside, max(tolerance * size, 1e-12))
+        pairs = close_links(inside, max(tolerance * size, 1e-12))
         if len(pairs):
             label = connected_parts(pairs, len(inside))
             first = np.unique(label, return_index=True)[1]
@@ -238,7 +238,7 @@ def _joined_borders(
     border = np.unique(np.stack(np.divmod(keys[times == 1], len(points))))
     if joins is not None:
         border = border[joins[border]]
-    pairs = border[close_pairs(points[border], max(distance, 1e-12))]
+    pairs = border[close_links(points[border], max(distance, 1e-12))]
     part = np.zeros(len(points), dtype=np.int64)
     for k, mesh in enumerate(parts):
         part[mesh.vertices] = k

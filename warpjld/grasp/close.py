@@ -65,13 +65,17 @@ class Closer:
         covering: The hand, smooth method.
         thing: The object.
         near: Search structures of the object, if there are some already, such as those of another hand's ``Closer``.
+        device: Warp device of new ones, on which joints flex until the first touch and distances to the object are
+            measured. Distances to the skin, and between digits, are measured on the CPU.
 
     Attributes:
         both: Distances between this hand and object.
     """
 
-    def __init__(self, covering: Covering, thing: GraspObject, near: NearObject | None = None) -> None:
-        self.covering, self.thing, self.both = covering, thing, HandObjectGaps(covering, thing, near)
+    def __init__(
+        self, covering: Covering, thing: GraspObject, near: NearObject | None = None, device: str = "cpu"
+    ) -> None:
+        self.covering, self.thing, self.both = covering, thing, HandObjectGaps(covering, thing, near, device)
         self._skin, self._posed = kept_with(covering, MovedSkin), kept_with(covering, PosedSkins)
 
     def close(

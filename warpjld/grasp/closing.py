@@ -39,14 +39,16 @@ class MovedSkin:
 
     def __init__(self, covering: Covering) -> None:
         self.covering = covering
+        self._packed: dict[str, Any] = {}
         self._beyond: dict[int, NDArray[np.int32]] = {}
         self._moving: dict[tuple[int, ...], NDArray[np.int32]] = {}
-        self._searched: dict[tuple[tuple[int, ...], int], tuple[Any, Any, int]] = {}
+        self._searched: dict[tuple[tuple[int, ...], int, str], tuple[Any, Any, int]] = {}
 
-    @cached_property
-    def packed(self) -> Any:
-        """``warpjld_kernels.closing_chain.Skin``."""
-        return skin_on("cpu", [self.covering])
+    def packed(self, device: Any) -> Any:
+        """``warpjld_kernels.closing_chain.Skin`` on a device."""
+        if str(device) not in self._packed:
+            self._packed[str(device)] = skin_on(device, [self.covering])
+        return self._packed[str(device)]
 
     def beyond(self, joint: int) -> NDArray[np.int32]:
         """Vertices at or beyond a joint, see ``skin_beyond``."""
@@ -60,8 +62,8 @@ class MovedSkin:
             self._moving[joints] = skin_that_moves(self.covering, joints)
         return self._moving[joints]
 
-    def searched(self, joints: tuple[int, ...], every: int) -> tuple[Any, Any, int]:
-        """Every so manieth vertex beyond each of these joints.
+    def searched(self, joints: tuple[int, ...], every: int, device: Any) -> tuple[Any, Any, int]:
+        """Every so manieth vertex beyond each of these joints, on a device.
 
         Returns:
             Warp arrays of these vertices, one joint's after another, and of where each joint's begin; and the number
@@ -69,12 +71,13 @@ class MovedSkin:
         """
         import warp as wp
 
-        if (joints, every) not in self._searched:
+        key = joints, every, str(device)
+        if key not in self._searched:
             vertices = [self.beyond(joint)[::every] for joint in joints]
             first = np.cumsum([0, *map(len, vertices)])
-            arrays = (array_on("cpu", a, wp.int32) for a in (np.concatenate(vertices), first))
-            self._searched[joints, every] = (*arrays, max(map(len, vertices)))
-        return self._searched[joints, every]
+            arrays = (array_on(device, a, wp.int32) for a in (np.concatenate(vertices), first))
+            self._searched[key] = (*arrays, max(map(len, vertices)))
+        return self._searched[key]
 
 
 class ClosingHands:
@@ -84,7 +87,7 @@ class ClosingHands:
         skin: The hand's skin.
         poses: G open postures to start from.
         angles: Their joint angles [rad], shape (G, J, 4).
-        near: The object.
+        near: The object; the searches run on its device.
         places: Its placement for every hand.
         every: Stride: only every ``every``-th vertex is searched.
         tolerance: Distance that counts as a touch [m].
@@ -111,7 +114,7 @@ class ClosingHands:
         self.angles = angles.copy()
         self._skin, self._open, self._near, self._places = skin, angles, near, places
         self._skeleton = skin.covering.skeleton
-        self._every, self._tolerance = every, tolerance
+        self._every, self._tolerance, self._device = every, tolerance, near.device
         self._floor: NDArray[np.float64] | None = None
         rest = poses_from_angles(self._skeleton, angles)
         turn = Rotation.from_quat(poses.rotations[:, 0]) * Rotation.from_quat(rest.rotations[:, 0]).inv()
@@ -129,7 +132,7 @@ class ClosingHands:
 
     def skins_of(self, hands: NDArray[np.int64], angles: NDArray[np.float64]) -> NDArray[np.float32]:
         """Deformed skins with angles (n, J, 4) of n hands [m], shape (n, V, 3)."""
-        return self._skin.covering.deform(self.poses_of(hands, angles), threads=1)
+        return self._skin.covering.deform(self.poses_of(hands, angles), device=str(self._device), threads=1)
 
     def skin_gaps(self, bases: list[int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Distances from the skin's vertices to the object; edges of the object inside the skin are not detected.
@@ -161,25 +164,15 @@ class ClosingHands:
         from warpjld_kernels.first_touch import first_touch
 
         count, moving = len(hands), rates != 0.0
-        vertices, first, most = self._skin.searched(tuple(joints[:, 0].tolist()), self._every)
+        vertices, first, most = self._skin.searched(tuple(joints[:, 0].tolist()), self._every, self._device)
         frames, used = np.repeat(np.arange(count), len(joints)), np.tile(joints[:, moving], (count, 1))
         packed = self._on_object(hands, frames, used, rates[moving])
-        status = np.empty((count, len(joints)), dtype=np.int32)
-        closing = np.empty(status.shape, dtype=np.float32)
-        earliest = np.empty((status.size, most), dtype=np.float32)
-        inputs = [
-            vertices,
-            first,
-            self._tolerance,
-            self._tolerance,
-            wp.array(earliest, dtype=float, device="cpu", copy=False),
-            wp.array(np.empty_like(earliest), dtype=float, device="cpu", copy=False),
-        ]
-        outs = [
-            wp.array(a.reshape(-1), dtype=kind, device="cpu", copy=False)
-            for a, kind in ((status, wp.int32), (closing, float))
-        ]
-        wp.launch(first_touch, status.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
+        chains = count * len(joints)
+        scratch = [wp.empty((chains, most), dtype=float, device=self._device) for _ in range(2)]
+        inputs = [vertices, first, self._tolerance, self._tolerance, *scratch]
+        outs = [wp.empty(chains, dtype=kind, device=self._device) for kind in (wp.int32, float)]
+        wp.launch(first_touch, chains, inputs=[packed, *inputs], outputs=outs, device=self._device)
+        status, closing = (out.numpy().reshape(count, len(joints)) for out in outs)
         touched = status != int(SearchStatus.NO_CONTACT)
         by = closing.astype(np.float64)
         for d, chain in enumerate(joints):
@@ -233,19 +226,18 @@ class ClosingHands:
 
         affected, first = np.unique(rows, return_index=True)
         packed = self._opening(hands[affected], [base])
-        by = np.zeros(len(affected), dtype=np.float32)
+        by = wp.zeros(len(affected), dtype=float, device=self._device)
         inputs = [
-            array_on("cpu", vertices, wp.int32),
-            array_on("cpu", floor, float),
-            array_on("cpu", np.append(first, len(rows)), wp.int32),
+            array_on(self._device, vertices, wp.int32),
+            array_on(self._device, floor, float),
+            array_on(self._device, np.append(first, len(rows)), wp.int32),
             _WIDEST,
             _CUTS,
             _PIECES,
         ]
-        outs = [wp.array(by, dtype=float, device="cpu", copy=False)]
-        wp.launch(least_opening, len(affected), inputs=[packed, *inputs], outputs=outs, device="cpu")
+        wp.launch(least_opening, len(affected), inputs=[packed, *inputs], outputs=[by], device=self._device)
         now, start = self.angles[hands[affected], base, FLEXION], self._open[hands[affected], base, FLEXION]
-        self.angles[hands[affected], base, FLEXION] = np.maximum(now - by, np.minimum(start, now))
+        self.angles[hands[affected], base, FLEXION] = np.maximum(now - by.numpy(), np.minimum(start, now))
 
     def _opened_distances(
         self, hands: NDArray[np.int64], bases: list[int], rows: NDArray[np.int64], vertices: NDArray[np.int32]
@@ -257,15 +249,14 @@ class ClosingHands:
         affected, row = np.unique(rows, return_inverse=True)
         packed = self._opening(hands[affected], bases)
         chain = np.arange(len(bases))[:, None] * len(affected) + row
-        out = np.empty(chain.shape, dtype=np.float32)
+        out = wp.empty(chain.size, dtype=float, device=self._device)
         inputs = [
-            array_on("cpu", chain.ravel(), wp.int32),
-            array_on("cpu", np.tile(vertices, len(bases)), wp.int32),
+            array_on(self._device, chain.ravel(), wp.int32),
+            array_on(self._device, np.tile(vertices, len(bases)), wp.int32),
             _WIDEST,
         ]
-        outs = [wp.array(out.reshape(-1), dtype=float, device="cpu", copy=False)]
-        wp.launch(distances_at, out.size, inputs=[packed, *inputs], outputs=outs, device="cpu")
-        return out.astype(np.float64)
+        wp.launch(distances_at, chain.size, inputs=[packed, *inputs], outputs=[out], device=self._device)
+        return np.asarray(out.numpy().reshape(chain.shape).astype(np.float64))
 
     def _opening(self, hands: NDArray[np.int64], bases: list[int]) -> Any:
         """Kernel input for opening base joints: row d · n + i is joint d of hand i, which stops at its open angle."""
@@ -314,9 +305,13 @@ class ClosingHands:
         """Posture, drives and what holds them, ``warpjld_kernels.first_touch.Hands``, filled anew for each launch."""
         from warpjld_kernels.first_touch import Hands
 
-        hands = Hands()
-        hands.solids, hands.grid, hands.skin = self._near.objects.solids, self._near.grid, self._skin.packed
-        return posture_arrays("cpu"), drives_arrays("cpu"), StructArrays(hands, "cpu")
+        hands, device = Hands(), self._device
+        hands.solids, hands.grid, hands.skin = (
+            self._near.objects.solids,
+            self._near.grid,
+            self._skin.packed(device),
+        )
+        return posture_arrays(device), drives_arrays(device), StructArrays(hands, device)
 
     def _depths(
         self, hands: NDArray[np.int64], vertices: NDArray[np.int32], angles: NDArray[np.float64]
@@ -332,4 +327,4 @@ class ClosingHands:
         import warp as wp
 
         local = [self._places[h].to_local(own)[0] for h, own in zip(hands, skins, strict=True)]
-        return wp.array(np.array(local, dtype=np.float32), dtype=wp.vec3, device="cpu")
+        return wp.array(np.array(local, dtype=np.float32), dtype=wp.vec3, device=self._device)

@@ -14,6 +14,7 @@ from warpjld.errors import InputError
 from warpjld.geometry.spatial_order import spatial_order
 from warpjld.grasp.feature_normals import face_normals, feature_normals
 from warpjld.grasp.objects import GraspObject, Places
+from warpjld.grasp.triangle_frames import triangle_frames
 from warpjld.grasp.triangle_tree import build_tree, join_trees
 from warpjld.runtime.query_mesh import query_mesh
 from warpjld.runtime.threads import in_threads, threads_for
@@ -199,9 +200,11 @@ def _tree_on(device: Any, things: Sequence[GraspObject]) -> Any:
     from warpjld_kernels.triangle_tree import Tree
 
     tree, built = Tree(), join_trees([build_tree(thing.vertices, thing.faces) for thing in things])
-    kinds = {"root": wp.int32, "child": wp.int32, "boxes": float, "corners": float, "face": wp.int32, "frames": float}
+    frames = triangle_frames(built.corners.transpose(0, 3, 1, 2)).transpose(0, 2, 1)
+    kinds = {"root": wp.int32, "child": wp.int32, "boxes": float, "corners": float, "face": wp.int32}
     for name, kind in kinds.items():
         setattr(tree, name, wp.array(getattr(built, name).ravel(), dtype=kind, device=device))
+    tree.frames = wp.array(frames.ravel(), dtype=float, device=device)
     return tree
 
 

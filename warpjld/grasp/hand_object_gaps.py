@@ -31,14 +31,18 @@ class HandObjectGaps:
         covering: The hand.
         thing: The object.
         near: Search structures of the object, if there are some already.
+        device: Warp device of new ones, on which distances to the object are measured. Distances to the skin are
+            measured on the CPU.
 
     Attributes:
         parts: Names of the parts, e.g. ``left.index``, ``left.palm``.
         part_of_vertex: Number of every vertex's part, shape (V,).
     """
 
-    def __init__(self, covering: Covering, thing: GraspObject, near: NearObject | None = None) -> None:
-        self.covering, self.thing, self.near = covering, thing, near or NearObject(thing)
+    def __init__(
+        self, covering: Covering, thing: GraspObject, near: NearObject | None = None, device: str = "cpu"
+    ) -> None:
+        self.covering, self.thing, self.near = covering, thing, near or NearObject(thing, device)
         self._skins = kept_with(covering, PosedSkins)
         self.parts = self._skins.parts.names
         owned = kept_with(covering, _Owners)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.device import shared_on
 from warpjld.grasp.distance import ObjectSet
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.outline_points import outline_points
@@ -41,17 +42,20 @@ class NearObject:
 
     Args:
         thing: The object at its own placement.
+        device: Warp device of the object, its grid, and all that is measured or searched on it.
 
     Attributes:
         thing: As given.
         objects: The object alone, placed at the origin.
+        device: The Warp device.
     """
 
-    def __init__(self, thing: GraspObject) -> None:
+    def __init__(self, thing: GraspObject, device: str = "cpu") -> None:
         import warp as wp
         from warpjld_kernels.signed_grid import UNKNOWN, SignedGrid
 
-        self.thing, self.objects = thing, ObjectSet(thing.placed())
+        self.thing, self.objects = thing, ObjectSet(thing.placed(), device=device)
+        self.device = self.objects.device
         low, high = self._box = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
         size = high - low
         step = max(_STEP, float((np.prod(size + 4.0 * _STEP) / _MOST) ** (1.0 / 3.0)))
@@ -62,7 +66,7 @@ class NearObject:
         grid.object, grid.step = 0, step
         grid.lowest, grid.highest = wp.vec3d(*(low - slack)), wp.vec3d(*(high + slack))
         grid.low, grid.count = wp.vec3d(*(low - _AROUND * step)), wp.vec3i(*count.tolist())
-        grid.values = wp.full(int(count.prod()), float(UNKNOWN), dtype=wp.float64, device="cpu")
+        grid.values = wp.full(int(count.prod()), float(UNKNOWN), dtype=wp.float64, device=self.device)
         self.grid: Any = grid
 
     @cached_property
@@ -93,8 +97,11 @@ class NearObject:
             (nearest, wp.int32),
             (gaps, wp.float64),
         )
-        inputs = [wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in arrays]
-        wp.launch(least_by_part, len(gaps), inputs=[self.objects.solids, self.grid, points, *inputs], device="cpu")
+        held = [shared_on(self.device, a, kind) for a, kind in arrays]
+        inputs = [self.objects.solids, self.grid, points.to(self.device), *held]
+        wp.launch(least_by_part, len(gaps), inputs=inputs, device=self.device)
+        if not self.device.is_cpu:
+            gaps[...] = held[-1].numpy()
 
     def least(self, skins: NDArray[np.floating]) -> NDArray[np.float64]:
         """Smallest signed distance of skins (P, V, 3) in world space to the object at its own placement [m], (P,)."""
@@ -102,7 +109,7 @@ class NearObject:
 
         count = skins.shape[1]
         local = self.thing.place.to_local(skins.reshape(-1, 3))[0].astype(np.float32)
-        points = wp.array(local.reshape(skins.shape), dtype=wp.vec3, device="cpu", copy=False)
+        points = shared_on(self.device, local.reshape(skins.shape), wp.vec3)
         gaps = np.full((len(skins), 1), np.inf)
         self.least_by_part(points, np.arange(count, dtype=np.int32), np.zeros(count, dtype=np.int32), gaps)
         return gaps[:, 0]
@@ -138,12 +145,11 @@ class NearObject:
         import warp as wp
         from warpjld_kernels.signed_grid import least_distances
 
-        out = np.empty(points.shape[:-1], dtype=np.float32)
-        asked = wp.array(np.ascontiguousarray(points, np.float32), dtype=wp.vec3, device="cpu", copy=False)
-        outs = [wp.array(out, dtype=float, device="cpu", copy=False)]
-        inputs = [self.grid, self.objects.solids, asked, *beside]
-        wp.launch(least_distances, out.shape, inputs=inputs, outputs=outs, device="cpu")
-        return out
+        asked = shared_on(self.device, np.ascontiguousarray(points, np.float32), wp.vec3)
+        out = wp.empty(points.shape[:-1], dtype=float, device=self.device)
+        inputs = [self.grid, self.objects.solids, asked, *(one.to(self.device) for one in beside)]
+        wp.launch(least_distances, out.shape, inputs=inputs, outputs=[out], device=self.device)
+        return np.asarray(out.numpy())
 
     def near(self, points: NDArray[np.floating], limit: float) -> NearPoints:
         """Closest points for points (n, 3) in the object's frame that lie inside it or within a limit [m] of it."""
@@ -151,15 +157,10 @@ class NearObject:
         from warpjld_kernels.signed_grid import measure_near
 
         count = len(points)
-        distance, face = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.int32)
-        point = np.zeros((count, 3), dtype=np.float32)
-        asked = wp.array(np.ascontiguousarray(points, np.float64), dtype=wp.vec3d, device="cpu", copy=False)
-        outs = [
-            wp.array(a, dtype=kind, device="cpu", copy=False)
-            for a, kind in ((distance, float), (face, wp.int32), (point, wp.vec3))
-        ]
-        wp.launch(
-            measure_near, count, inputs=[self.objects.solids, self.grid, asked, limit], outputs=outs, device="cpu"
-        )
+        asked = shared_on(self.device, np.ascontiguousarray(points, np.float64), wp.vec3d)
+        outs = [wp.zeros(count, dtype=kind, device=self.device) for kind in (float, wp.int32, wp.vec3)]
+        inputs = [self.objects.solids, self.grid, asked, limit]
+        wp.launch(measure_near, count, inputs=inputs, outputs=outs, device=self.device)
+        distance, face, point = (out.numpy() for out in outs)
         distance[face < 0] = np.inf
         return NearPoints(distance, face, point)

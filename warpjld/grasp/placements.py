@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.covering import Covering
+from warpjld.covering.device import shared_on
 from warpjld.geometry.rotations import unit
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.opening import Opening
@@ -200,19 +202,19 @@ def _approach(covering: Covering, hands: Candidates, near: NearObject, reach: ND
     from warpjld_kernels.lines_to_object import come_near
 
     skins = covering.deform(hands.poses(covering.skeleton), threads=1)
-    place, moved = near.thing.place, np.zeros(len(hands))
+    place = near.thing.place
     scratch = np.empty((2, *skins.shape[:2]), dtype=np.float32)
-    arrays = [
+    arrays: list[tuple[NDArray, Any]] = [
         (skins, wp.vec3),
         (np.ascontiguousarray(hands.approach), wp.vec3d),
         (reach.astype(np.float64), wp.float64),
     ]
     settings = [_CLEARANCE, _NEXT, _STEPS]
-    rest = [(scratch[0], float), (scratch[1], float), (moved, wp.float64)]
-    held, out = ([wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in group] for group in (arrays, rest))
+    rest: list[tuple[NDArray, Any]] = [(scratch[0], float), (scratch[1], float), (np.zeros(len(hands)), wp.float64)]
+    held, out = ([shared_on(near.device, a, kind) for a, kind in group] for group in (arrays, rest))
     objects = [near.objects.solids, near.grid, wp.vec3d(*place.position[0]), wp.quatd(*place.rotation[0])]
-    wp.launch(come_near, len(hands), inputs=[*objects, *held, *settings, *out], device="cpu")
-    return hands.moved(moved)
+    wp.launch(come_near, len(hands), inputs=[*objects, *held, *settings, *out], device=near.device)
+    return hands.moved(out[-1].numpy())
 
 
 def around(axis: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:

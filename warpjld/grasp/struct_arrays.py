@@ -18,7 +18,7 @@ class StructArrays:
 
     Args:
         struct: Instance of a Warp struct.
-        device: Warp device of its arrays.
+        device: Warp device of its arrays, ``warp.Device``.
 
     Attributes:
         struct: As given.
@@ -36,5 +36,5 @@ class StructArrays:
             return
         array = array_on(self._device, values, kind)
         setattr(self.struct, name, array)
-        if array.device.is_cpu:
+        if self._device.is_cpu:
             self._kept[name] = array.numpy()  # a view of the same memory

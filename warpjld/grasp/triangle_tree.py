@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.grasp.triangle_frames import triangle_frames
-
 __all__ = ["TriangleTree", "build_tree", "halved", "join_trees"]
 
 _WIDTH = 8  # children of a node, triangles of a leaf
@@ -31,7 +29,6 @@ class TriangleTree:
         boxes: Lower and upper corners of the children's boxes [m], shape (n, 2, 3, 8).
         corners: Corners of the leaves' triangles [m], shape (leaves, 3, 3, 8).
         face: Indices of these triangles, shape (leaves, 8).
-        frames: Their frames, shape (leaves, 20, 8), see ``triangle_frames``.
     """
 
     root: NDArray[np.int32]
@@ -39,7 +36,6 @@ class TriangleTree:
     boxes: NDArray[np.float32]
     corners: NDArray[np.float32]
     face: NDArray[np.int32]
-    frames: NDArray[np.float32]
 
 
 def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> TriangleTree:
@@ -80,7 +76,6 @@ def build_tree(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Trian
         boxes=np.ascontiguousarray(np.concatenate(levels[::-1])),
         corners=np.ascontiguousarray(inside.transpose(0, 2, 3, 1)),
         face=order.astype(np.int32),
-        frames=np.ascontiguousarray(triangle_frames(inside).transpose(0, 2, 1)),
     )
 
 
@@ -96,7 +91,6 @@ def join_trees(trees: list[TriangleTree]) -> TriangleTree:
         boxes=np.concatenate([t.boxes for t in trees]),
         corners=np.concatenate([t.corners for t in trees]),
         face=np.concatenate([t.face for t in trees]),
-        frames=np.concatenate([t.frames for t in trees]),
     )
 
 

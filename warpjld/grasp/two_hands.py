@@ -114,6 +114,7 @@ def find_two_handed(
     count: int = 96,
     friction: float = 0.6,
     seed: int = 0,
+    device: str = "cpu",
 ) -> dict[str, AutoGrasp]:
     """Find a grasp with two hands: place them on opposite sides of the object, close, judge both together.
 
@@ -130,6 +131,7 @@ def find_two_handed(
         count: Largest number of placements.
         friction: Coulomb coefficient.
         seed: Seed of the random numbers.
+        device: Warp device, see ``Closer``.
 
     Returns:
         The grasp of each side; both have the verdict on the two together. Their posture is ``palms`` if both palms are
@@ -143,7 +145,7 @@ def find_two_handed(
     if count < 1:
         raise InputError(f"count: want 1 or more, got {count}")
     check_friction(friction)
-    sides = [_side(name, hands[name], thing, obstacles, friction) for name in _SIDES]
+    sides = [_side(name, hands[name], thing, obstacles, friction, device) for name in _SIDES]
     rng = np.random.default_rng(seed)
     near = sides[0].closer.both.near
     widths = sample_widths(near, _LINES, rng, widest=float(np.linalg.norm(thing.size)))
@@ -172,9 +174,9 @@ def find_two_handed(
 
 
 def _side(
-    name: str, covering: Covering, thing: GraspObject, obstacles: Sequence[GraspObject], friction: float
+    name: str, covering: Covering, thing: GraspObject, obstacles: Sequence[GraspObject], friction: float, device: str
 ) -> _Side:
-    closer = Closer(covering, thing)
+    closer = Closer(covering, thing, device=device)
     return _Side(name, closer, Judge(closer.both, name, friction), Obstacles(covering, obstacles))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.device import shared_on
 from warpjld.geometry.rotations import unit
 from warpjld.grasp.near_object import NearObject
 
@@ -82,10 +83,7 @@ def _followed(
 
     along, leaves = np.full(len(start), 20.0 * _SURFACE), np.empty(len(start), dtype=np.int32)
     kinds = (wp.vec3d, wp.vec3d, wp.float64, wp.int32)
-    arrays = [
-        wp.array(a, dtype=kind, device="cpu", copy=False)
-        for a, kind in zip((start, line, along, leaves), kinds, strict=True)
-    ]
+    arrays = [shared_on(near.device, a, kind) for a, kind in zip((start, line, along, leaves), kinds, strict=True)]
     inputs = [near.objects.solids, *arrays[:2], _SURFACE, widest, _STEPS, *arrays[2:]]
-    wp.launch(follow_through, len(start), inputs=inputs, device="cpu")
-    return along, leaves
+    wp.launch(follow_through, len(start), inputs=inputs, device=near.device)
+    return arrays[2].numpy(), arrays[3].numpy()

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.geometry.coincident import close_pairs, connected_parts
+from warpjld.geometry.coincident import close_links, connected_parts
 from warpjld.geometry.surface import Surface
 from warpjld.geometry.winding import winding_numbers
 from warpjld.listed import first_few
@@ -62,7 +62,7 @@ def rigid_parts(
 def _pieces(surface: Surface) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Vertex and face indices of every connected piece."""
     count = len(surface.vertices)
-    pairs = close_pairs(surface.vertices, _SAME_PLACE * surface.size)
+    pairs = close_links(surface.vertices, _SAME_PLACE * surface.size)
     label = connected_parts(np.concatenate([surface.faces[:, :2], surface.faces[:, 1:], pairs]), count)
     number = int(label.max()) + 1
     of_face = label[surface.faces[:, 0]]

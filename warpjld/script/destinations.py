@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
 from warpjld.errors import InputError
+from warpjld.files.overwriting import check_place
 
 __all__ = ["check_destinations"]
 
@@ -24,14 +24,7 @@ def check_destinations(folder: Path, names: Iterable[str], size: float = 0.0) ->
         InputError: A folder or a file is in the way, the folder cannot be written into, or the disk has less room.
     """
     for name in names:
-        place = folder / name
-        if place.is_dir():
-            raise InputError("a folder stands where this file should go", path=place)
-        there = next(parent for parent in (*place.parents, Path()) if os.path.lexists(parent))
-        if not there.is_dir():
-            raise InputError("is a file; want a folder to write into", path=there)
-        if not os.access(there, os.W_OK | os.X_OK):
-            raise InputError("cannot write into this folder: permission denied", path=there)
+        check_place(folder / name)
     there = next(parent for parent in (folder, *folder.parents, Path()) if parent.is_dir())
     free = shutil.disk_usage(there).free
     if size > free:

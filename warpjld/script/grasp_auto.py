@@ -48,7 +48,7 @@ def grasp_by_itself(
     covering = cover(actor)
     thing = placed_at(scene, prop, last)
     obstacles = [placed_at(scene, other, last) for other in scene.props.values() if other is not prop]
-    closer, middle = Closer(covering, thing), (first + last) / 2.0
+    closer, middle = Closer(covering, thing, device=scene.device), (first + last) / 2.0
     if f"{side}.shoulder" in actor.skeleton.names:
         found = _by_arm(scene, actor, closer, side, (first, middle, last), obstacles, tries, posture_name)
     else:

@@ -49,7 +49,9 @@ def grasp_by_both(scene: Scene, prop: Prop, first: float, last: float, tries: in
     actors, middle = both_hands(scene), (first + last) / 2.0
     obstacles = [placed_at(scene, other, last) for other in scene.props.values() if other is not prop]
     coverings = {side: cover(actor) for side, actor in actors.items()}
-    found = find_two_handed(coverings, placed_at(scene, prop, last), obstacles=obstacles, count=tries)
+    found = find_two_handed(
+        coverings, placed_at(scene, prop, last), obstacles=obstacles, count=tries, device=scene.device
+    )
     attempts = []
     for side, actor in actors.items():
         own = found[side]

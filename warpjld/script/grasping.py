@@ -144,7 +144,7 @@ def close_digits(
     poses, angles = posture(scene, actor, last)
     thing = placed_at(scene, prop, last)
     wanted = list(digits) or [name for name in digit_chains(actor.skeleton) if name.startswith(f"{side}.")]
-    closed = Closer(covering, thing).close(poses, angles, digits=wanted, coupling=coupling)
+    closed = Closer(covering, thing, device=scene.device).close(poses, angles, digits=wanted, coupling=coupling)
     chains = digit_chains(actor.skeleton, wanted)
     grip = {}
     for name in closed.digits:
@@ -186,9 +186,10 @@ def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float
     for prop in scene.props.values():
         if prop is held:
             continue
-        both = HandObjectGaps(covering, prop.thing)
+        both = HandObjectGaps(covering, prop.thing, device=scene.device)
         if prop.deforms:
-            shapes = [HandObjectGaps(covering, placed_at(scene, prop, frame)) for frame in frames.tolist()]
+            things = [placed_at(scene, prop, frame) for frame in frames.tolist()]
+            shapes = [HandObjectGaps(covering, thing, device=scene.device) for thing in things]
             depths = np.concatenate([shape.depths(skin[None]) for shape, skin in zip(shapes, skins, strict=True)])
         else:
             depths = both.depths(skins, prop_places(scene.actors, scene.rate, prop, frames))

@@ -48,11 +48,15 @@ def before_contact(
     start = fallen_start(paths, float(request.first), float(request.last))
     stage, others = FallenAnimation(animation, paths), without(specification, names)
     before = StartFrame(start, {})
-    if others.flesh or others.physical:
+    if found.interrupted is not None:
+        before = replace(before, start=found.interrupted, interrupted=found.interrupted)
+    elif others.flesh or others.physical:
         before = find_start(stage, others, request, fell=True)
         before = replace(before, start=min(start, before.start))
     inside = taking_part(paths, before.start)
     outside = [name for name in names if name not in inside]
+    if found.interrupted is not None:
+        inside, outside = names, []
     if outside and not (inside or others.flesh or others.physical):
         inside, outside = names, []  # nothing else deforms, and no frame is left to solve
     moved = moved_by(paths, before, inside)
@@ -65,8 +69,11 @@ def after_contact(
     """Let objects fall that the hands no longer hold, if that is why the contact solve ended.
 
     Returns:
-        The start frame extended by the falls, and the result with ``released`` set; both unchanged if nothing falls.
+        The start frame extended by the falls, and the result with ``released`` set; both unchanged if nothing
+        falls. Where Ctrl-C ended a fall, the result says so.
     """
+    if before.interrupted is not None:
+        return before, _stopped(solved, before.interrupted)
     weights = any(specification.pull) and request.method != "paper"
     if solved.status not in (SolveStatus.UNHELD, SolveStatus.SLIDING) or not weights or solved.model.animation is None:
         return before, solved
@@ -85,7 +92,16 @@ def after_contact(
         frames, places = moved.get(name, ([], []))
         moved[name] = ([*frames, *path.frames], [*places, *path.places])
     falls = (*before.falls, *fall_summaries(paths.values()), *found.openings)
-    return replace(before, moved=moved, falls=falls), replace(solved, released=first)
+    solved = replace(solved, released=first)
+    return replace(before, moved=moved, falls=falls), _stopped(solved, found.interrupted)
+
+
+def _stopped(solved: SolveResult, after: float | None) -> SolveResult:
+    """The result of a run that Ctrl-C ended after a frame of a fall; unchanged if nothing did."""
+    if after is None:
+        return solved
+    message = f"interrupted after frame {after:g}"
+    return replace(solved, status=SolveStatus.STOPPED, message=message, interrupted=True)
 
 
 def _bonds_left(solved: SolveResult, specification: ContactSpecification) -> list[BondStrength]:

@@ -263,7 +263,7 @@ def simulate(
         showing(surfaces_of_frames(driven, done.copy(), before))
         return reason if request.stop else None
 
-    frames = _frames(specification, request, model.start)
+    frames = [] if before.interrupted is not None else _frames(specification, request, model.start)
     if rigid := rests_rigidly(model, before, frames):
         frames, before = [], replace(before, falls=(*before.falls, rigid))
     checkpoint = CheckpointFile(

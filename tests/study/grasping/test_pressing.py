@@ -146,6 +146,7 @@ def test_digits_that_stay_short_of_the_handle(tmp_path: Path) -> None:
     assert set(far) == set(DIGITS)
     assert min(far.values()) > 0.7
     assert _without_share({"pinky": 0.0023}, ("thumb", "pinky")) == "pinky 2.3 mm short, thumb touching"
+    assert _without_share({}, ("thumb", "index"), ("index",)) == "thumb touching, index on bone"
 
 
 @pytest.mark.slow

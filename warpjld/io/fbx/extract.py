@@ -69,7 +69,10 @@ def load(path: Path) -> Any:
             index_error_handling=ufbx.IndexErrorHandling.NO_INDEX,
         )
     except (ufbx.UfbxError, RuntimeError, ValueError) as error:
-        raise InputError(f"cannot be read as FBX: {' '.join(str(error).split())}", path=path) from None
+        text = " ".join(str(error).split())
+        if text.startswith("Out of memory"):
+            raise MemoryError(text) from None
+        raise InputError(f"cannot be read as FBX: {text}", path=path) from None
 
 
 def bind_poses(scene: Any) -> dict[int, Array]:

@@ -129,7 +129,7 @@ def balanced_grip(
     effort, instant, balance = squeeze.effort(grip, closed.last), closed.last, before
     taking = _taking_part(hand, joints, effort, force)
     each = DigitSqueeze(model, squeeze.history, hand, taking, squeeze.first, squeeze.limits)
-    low, high = (np.clip(end, -request.most, request.most) for end in each.range)
+    low, high = each.range(request.most)
     grips, best = np.full(len(taking), grip), None
     for _ in range(_ROUNDS if len(taking) > 1 else 0):
         wanted = _distributed(model, hand, instant, balance, effort, each.digits, force)

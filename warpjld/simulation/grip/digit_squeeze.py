@@ -14,6 +14,7 @@ from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.bone_room import bone_room
 from warpjld.simulation.grip.shared_force import SAME_CLOSING, PressedDigits
 from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.report.efforts import effort_at
@@ -45,6 +46,8 @@ class DigitSqueeze:
         joints: Joints of each.
         wanted: Force of each digit of which its share is measured [N], shape (D,); None: shares are those of muscles.
         solved: Equilibria solved so far, beside the initial one.
+        bone_room: Digit, such as ``index`` → largest closing at which its bones are outside every object [rad], where
+            that is below the largest that ``range`` was asked for.
     """
 
     def __init__(
@@ -63,14 +66,23 @@ class DigitSqueeze:
         self._bounds = hand.bones.skeleton.limits[:, FLEXION]
         self._known: list[tuple[Array, ContactSolution]] = [(np.zeros(len(self.digits)), after)]
         self.solved = 0
+        self.bone_room: dict[str, float] = {}
 
-    @property
-    def range(self) -> tuple[Array, Array]:
-        """Closings at which the last joint of each digit reaches its limit [rad], each of shape (D,)."""
+    def range(self, most: float) -> tuple[Array, Array]:
+        """Closings at which the last joint of each digit reaches its limit, or its bone an object [rad], each (D,).
+
+        Args:
+            most: Largest closing and opening [rad].
+        """
         now = self._start[:, FLEXION]
         low = [float((self._bounds[one, 0] - now[one]).min()) for one in self.joints]
-        high = [float((self._bounds[one, 1] - now[one]).max()) for one in self.joints]
-        return np.minimum(low, 0.0), np.maximum(high, 0.0)
+        high = [min(most, float((self._bounds[one, 1] - now[one]).max())) for one in self.joints]
+        count = len(self.digits)
+        self.bone_room = room = bone_room(
+            self._model, self._hand, self._time, lambda by: self.angles(np.full(count, by)), max(high)
+        )
+        high = [min(one, room.get(name.rpartition(".")[2], most)) for name, one in zip(self.digits, high, strict=True)]
+        return np.clip(low, -most, 0.0), np.maximum(high, 0.0)
 
     def angles(self, grips: Array) -> Array:
         """Joint angles at closings (D,) [rad], shape (J, 4)."""

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
@@ -62,6 +60,7 @@ def find_grip(
     joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in request.channels]
     budget = SearchBudget() if request.lift else None
     squeeze = Squeeze(model, history, hand, joints, after, limits, budget)
+    squeeze.keep_bones_out(request.most)
     most = max(min(request.most, squeeze.room), 1e-6)
     found = _gentlest(request, squeeze, most, tell) if request.lift else _firm(request, squeeze, most, tell)
     if not request.lift and not request.digits and found.status == ForceStatus.REACHED.name:
@@ -72,7 +71,7 @@ def find_grip(
     if found.lowered is not None:
         begins, free = request.middle - model.start, request.last - model.start
         release = SupportRelease(request.object, begins, free, found.lowered)
-    return replace(found, edits=_edits(hand, request, joints, found.grip), release=release)
+    return replace(found, edits=_edits(squeeze, request, joints, found.grip), release=release)
 
 
 def _closed_edits(hand: FleshBody, request: GripSpecification, balanced: BalancedGrip) -> tuple[AngleEdit, ...]:
@@ -82,16 +81,12 @@ def _closed_edits(hand: FleshBody, request: GripSpecification, balanced: Balance
     return tuple(AngleEdit(hand.name, joint, request.first, None, float(flexions[joint])) for joint in joints)
 
 
-def _edits(hand: FleshBody, request: GripSpecification, joints: Sequence[int], grip: float) -> tuple[AngleEdit, ...]:
-    """Edits that close the digits by a grip, up to their joint limits."""
+def _edits(squeeze: Squeeze, request: GripSpecification, joints: Sequence[int], grip: float) -> tuple[AngleEdit, ...]:
+    """Edits that close the digits by a grip, each as far as it may bend."""
     if grip == 0.0:
         return ()
-    now = hand.bones.animation.angles(request.first)[joints, FLEXION]
-    closed = np.maximum(now, np.minimum(now + grip, hand.bones.skeleton.limits[joints, FLEXION, 1]))
-    return tuple(
-        AngleEdit(hand.name, joint, request.first, None, float(value))
-        for joint, value in zip(joints, closed, strict=True)
-    )
+    closed = squeeze.angles(grip)[:, FLEXION]
+    return tuple(AngleEdit(squeeze.hand.name, joint, request.first, None, float(closed[joint])) for joint in joints)
 
 
 def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: Callable[[str], None]) -> FoundGrip:

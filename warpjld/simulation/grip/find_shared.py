@@ -18,7 +18,7 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.digit_squeeze import DigitSqueeze
 from warpjld.simulation.grip.force import PressedForce
 from warpjld.simulation.grip.found import FoundGrip, digits_that_press, trial_row
-from warpjld.simulation.grip.shared_force import PressedDigits, SharedGrip, share_force
+from warpjld.simulation.grip.shared_force import SAME_CLOSING, PressedDigits, SharedGrip, share_force
 from warpjld.simulation.specification import GripSpecification, located
 from warpjld.skeleton.channels import FLEXION
 
@@ -55,7 +55,7 @@ def find_shared(
             tell("; ".join(f"{d.rpartition('.')[2]} {math.degrees(g):.2f}° {f:.3g} N {s:.1%}" for d, g, f, s in each))
         return pressed
 
-    low, high = (np.clip(end, -request.most, request.most) for end in squeeze.range)
+    low, high = squeeze.range(request.most)
     found = share_force(press, low, high, strengths, request.force, start=_START)
     instant = squeeze.known(found.grips)
     effort = squeeze.effort(found.grips, instant) if instant is not None and instant.touches else None
@@ -73,11 +73,13 @@ def find_shared(
         for joint in one
     )
     force = 0.0 if found.pressed is None else float(found.pressed.forces.sum())
-    text, grip = _text(request.force, list(joints), found), float(found.grips.max())
+    left = {list(joints)[k].rpartition(".")[2]: float(found.grips[k]) for k in found.left_out}
+    on_bone = tuple(d for d, at in left.items() if at >= squeeze.bone_room.get(d, math.inf) - SAME_CLOSING)
+    text, grip = _text(request.force, list(joints), found, on_bone), float(found.grips.max())
     edits = edits if found.grips.any() else ()
     each = digits_that_press(effort)
-    left = tuple(list(joints)[k].rpartition(".")[2] for k in found.left_out)
-    return FoundGrip(request, found.status.name, text, grip, None, force, each, tuple(rows), edits, left_out=left)
+    short = tuple(left), on_bone
+    return FoundGrip(request, found.status.name, text, grip, None, force, each, tuple(rows), edits, None, *short)
 
 
 def _sharing(hand: FleshBody, request: GripSpecification) -> list[str]:
@@ -95,7 +97,7 @@ def _sharing(hand: FleshBody, request: GripSpecification) -> list[str]:
     return wanted
 
 
-def _text(force: float, digits: Sequence[str], found: SharedGrip) -> str:
+def _text(force: float, digits: Sequence[str], found: SharedGrip, on_bone: Sequence[str]) -> str:
     """Summary of a shared grip in one line."""
     names = [digit.rpartition(".")[2] for digit in digits]
     out = f"{' + '.join(names)}: {found.status.value}; {force:.3g} N asked for"
@@ -105,6 +107,7 @@ def _text(force: float, digits: Sequence[str], found: SharedGrip) -> str:
     each = zip(names, found.pressed.forces, found.pressed.shares, found.grips, strict=True)
     out += ", ".join(f"{name} {f:.3g} N ({s:.1%} of its muscles, {math.degrees(g):+.2f}°)" for name, f, s, g in each)
     if found.left_out:
-        short = ", ".join(names[k] for k in found.left_out)
+        left = [names[k] for k in found.left_out]
+        short = ", ".join(f"{name} (its bone meets the object)" if name in on_bone else name for name in left)
         out += f"; without their share, as far as they may bend: {short}"
     return out

@@ -68,6 +68,7 @@ class FoundGrip:
         edits: Angles of the closing digits.
         release: Release of the object's support; None if it is not released.
         left_out: Digits that press with less than their share of the muscles, as far as they may bend on.
+        on_bone: Those of them that may bend no farther because a bone would be inside the object.
     """
 
     request: GripSpecification
@@ -81,6 +82,7 @@ class FoundGrip:
     edits: tuple[AngleEdit, ...] = ()
     release: SupportRelease | None = None
     left_out: tuple[str, ...] = ()
+    on_bone: tuple[str, ...] = ()
 
     @property
     def interrupted(self) -> bool:

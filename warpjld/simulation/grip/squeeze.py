@@ -15,6 +15,7 @@ from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.grip.bone_room import bone_room
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.sensitivity.effort_slope import DigitSlope, EffortTangent
@@ -63,6 +64,7 @@ class Squeeze:
         self.model, self.history, self.hand = model, history, hand
         self._joints, self.limits = list(joints), limits
         self._start = hand.bones.angles(after.last.time)
+        self._high = np.asarray(hand.bones.skeleton.limits[self._joints, FLEXION, 1])
         self.time, self.budget = after.last.time, budget or SearchBudget(None)
         self.first = after
         self._closed: dict[float, ContactSolution] = {0.0: after}
@@ -70,7 +72,7 @@ class Squeeze:
 
     @property
     def room(self) -> float:
-        """Grip at which the last joint reaches its limit [rad]."""
+        """Grip at which the last joint reaches its limit, or the bone of its digit an object [rad]."""
         return float((self._high - self._start[self._joints, FLEXION]).max(initial=0.0))
 
     def angles(self, grip: float) -> NDArray[np.float64]:
@@ -136,7 +138,8 @@ class Squeeze:
         poses = self.hand.bones.posed(self.angles(grip), self.time)
         return effort_at(self.model, self.hand, poses, instant, self.limits)
 
-    @property
-    def _high(self) -> NDArray[np.float64]:
-        """Limits of the joints' flexion [rad], shape (n,)."""
-        return np.asarray(self.hand.bones.skeleton.limits[self._joints, FLEXION, 1])
+    def keep_bones_out(self, most: float) -> None:
+        """Let no digit bend so far, up to a grip of ``most`` [rad], that its bones are inside an object."""
+        room, names = bone_room(self.model, self.hand, self.time, self.angles, most), self.hand.bones.skeleton.names
+        left = np.array([room.get(names[joint].split(".")[-2], np.inf) for joint in self._joints])
+        self._high = np.minimum(self._high, self._start[self._joints, FLEXION] + left)

@@ -26,6 +26,8 @@ _TYPES: dict[str, Any] = {
 }
 """Python types that JSON yields, by annotation of a record's field."""
 _TRIPLE = "tuple[float, float, float]"
+_MOST = 1e100
+"""Magnitude that no state has in any unit; products of two numbers below it are finite."""
 _UNKNOWN = ("bond_gap",)
 """Fields of a contact state that may be NaN (unknown)."""
 
@@ -52,6 +54,8 @@ def check_checkpoint(
         _check(one.reactions, (count, 3), f"{what}: reactions")
         _check(one.nodal, (pairs, count, 3), f"{what}: contact forces")
         _check(one.bonded, (pairs,), f"{what}: shares of bonds")
+        if not ((one.bonded >= 0.0) & (one.bonded <= 1.0)).all():
+            raise InputError(f"{what}: shares of bonds: want 0 to 1")
         for part in fields(one.nodal_contact):
             _check(getattr(one.nodal_contact, part.name), (pairs, count), f"{what}: nodal {part.name}")
         if one.solves < 0 or not 0.0 <= one.penetration < np.inf:
@@ -95,8 +99,8 @@ def _check_state(state: ContactState, model: ContactModel, number: int) -> None:
     like = initial_state(sites, model.pairs[number])
     for one in fields(state):
         want = getattr(like, one.name)
-        known = np.isfinite if one.name not in _UNKNOWN else None
-        _check(getattr(state, one.name), want.shape, f"contact state {number}: {one.name}", want.dtype, known=known)
+        unknown = one.name in _UNKNOWN
+        _check(getattr(state, one.name), want.shape, f"contact state {number}: {one.name}", want.dtype, unknown=unknown)
 
 
 def _check_step(solution: ContactSolution, count: int) -> None:
@@ -117,11 +121,11 @@ def _check_edit(edit: AngleEdit, model: ContactModel) -> None:
         raise InputError(f"it edits joint {edit.joint} of '{edit.actor}', which is not there")
 
 
-def _check(array: Any, shape: tuple[int, ...], what: str, kind: Any = np.float64, *, known: Any = np.isfinite) -> None:
+def _check(array: Any, shape: tuple[int, ...], what: str, kind: Any = np.float64, *, unknown: bool = False) -> None:
     if array.shape != shape or array.dtype != kind:
         raise InputError(f"{what}: want {np.dtype(kind)} of shape {shape}, got {array.dtype} of shape {array.shape}")
-    if known is not None and array.dtype.kind == "f" and not known(array).all():
-        raise InputError(f"{what}: not finite")
+    if array.dtype.kind == "f" and not ((np.abs(array) < _MOST) | (unknown & np.isnan(array))).all():
+        raise InputError(f"{what}: not finite" if not np.isfinite(array).all() else f"{what}: above {_MOST:g}")
 
 
 def _listed(numbers: Sequence[float]) -> str:

@@ -172,14 +172,17 @@ def load_checkpoint(path: Path) -> Checkpoint:
 def _read(file: Any) -> Checkpoint:
     columns = {name: file[f"frames.{name}"] for name in _names(SolvedFrame)}
     nodal = {name: file[f"frames.nodal_contact.{name}"] for name in _names(NodalContact)}
+    if not columns["frame"].size:
+        raise InputError("no state of a contact solve: it holds no frame")
+    for name, array in [*columns.items(), *nodal.items()]:
+        if array.shape[:1] != columns["frame"].shape:
+            raise InputError(f"{name}: want one a frame, {columns['frame'].size}, got an array of shape {array.shape}")
     frames = []
     for k in range(len(columns["frame"])):
         one = {name: array[k] for name, array in columns.items()}
         one |= {"frame": float(one["frame"]), "solves": int(one["solves"]), "penetration": float(one["penetration"])}
         nodal_contact = NodalContact(**{name: array[k] for name, array in nodal.items()})
         frames.append(SolvedFrame(nodal_contact=nodal_contact, **one))
-    if not frames:
-        raise InputError("no state of a contact solve: it holds no frame")
     memories = range(int(file["memories"]))
     states = tuple(ContactState(**{n: file[f"memory{k}.{n}"] for n in _names(ContactState)}) for k in memories)
     last, step = frames[-1], None

@@ -30,11 +30,13 @@ class Falls:
         paths: Their paths by name.
         bonds: Bonds of the scene that hold after them.
         openings: Messages about bonds that impacts opened, and about impacts that were not solved.
+        interrupted: Frame after which Ctrl-C ended them; None if nothing did.
     """
 
     paths: dict[str, FallPath]
     bonds: list[BondStrength]
     openings: tuple[str, ...] = ()
+    interrupted: float | None = None
 
 
 def falling_names(contact: ContactSpecification, request: SolveSpecification) -> list[str]:
@@ -79,7 +81,7 @@ def follow_falls(
         members = [(rigid_shape(one.name, one.thing, contact.physical[one.name]), one.place(start)) for one in objects]
         stage.add(rigid_union(members))
     paths = stage.followed()
-    return Falls({name: paths[name] for name in names}, stage.contact.bonds, tuple(stage.openings))
+    return Falls({name: paths[name] for name in names}, stage.contact.bonds, tuple(stage.openings), stage.interrupted)
 
 
 def _released(bodies: Mapping[str, RigidBody]) -> list[RigidBody]:

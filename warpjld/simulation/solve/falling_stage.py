@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,7 +21,7 @@ from warpjld.simulation.fall.rigid_body import RigidBody, RigidState
 from warpjld.simulation.fall.strike import Strike, found_strikes
 from warpjld.simulation.fall.time_stepping import coast, step_bodies, steps_of
 from warpjld.simulation.solve.friction_closure import friction_closure
-from warpjld.simulation.specification import ContactSpecification, SolveSpecification
+from warpjld.simulation.specification import BondStrength, ContactSpecification, SolveSpecification
 
 __all__ = ["FallingStage"]
 
@@ -48,6 +48,7 @@ class FallingStage:
         bodies: Bodies that fall, rest or move.
         paths: Paths of their objects by name.
         openings: Messages about impacts.
+        interrupted: Frame after which Ctrl-C ended the falls; None if nothing did.
     """
 
     animation: Animation
@@ -58,6 +59,7 @@ class FallingStage:
     bodies: list[RigidBody] = field(default_factory=list)
     paths: dict[str, FallPath] = field(default_factory=dict)
     openings: list[str] = field(default_factory=list)
+    interrupted: float | None = None
     _quiet: dict[RigidBody, tuple[float, float]] = field(default_factory=dict)
     """Slow bodies: frame since when, and for how long [s]."""
     _impacts: list[Impact] = field(default_factory=list)
@@ -75,20 +77,34 @@ class FallingStage:
             self.paths[name] = FallPath(name, [self.start], [part.place], together=together)
 
     def followed(self) -> dict[str, FallPath]:
-        """Integrate frame by frame until all bodies rest, are held or have left the scene."""
+        """Integrate frame by frame until all bodies rest, are held or have left the scene. Ctrl-C ends it after the
+        last whole frame, if there is one."""
         solids = {
             name: one.obstacle(self.start) for name, one in self.animation.objects.items() if name not in self.paths
         }
         self._hold(self.start, solids)
-        frame = self.start
-        while frame < self.request.last and (self._impacts or any(self._moves(body) for body in self.bodies)):
-            self._frame(frame, min(frame + 1.0, float(self.request.last)), solids)
-            frame += 1.0
-            self._hold(frame, solids)
+        frame, known = self.start, self._known()
+        try:
+            while frame < self.request.last and (self._impacts or any(self._moves(body) for body in self.bodies)):
+                self._frame(frame, min(frame + 1.0, float(self.request.last)), solids)
+                self._hold(frame + 1.0, solids)
+                frame, known = frame + 1.0, self._known()
+        except KeyboardInterrupt:
+            if frame == self.start:
+                raise
+            self.interrupted = frame
+            self.paths, self.contact.bonds, self.openings = known
         for body in self.bodies:
             for path in self._paths(body):
                 path.speed = body.speed if path.rests is None else 0.0
         return self.paths
+
+    def _known(self) -> tuple[dict[str, FallPath], list[BondStrength], list[str]]:
+        """Paths, bonds and messages so far; an interrupt may come at any time within the next frame."""
+        paths = {
+            name: replace(path, frames=list(path.frames), places=list(path.places)) for name, path in self.paths.items()
+        }
+        return paths, list(self.contact.bonds), list(self.openings)
 
     def _paths(self, body: RigidBody) -> list[FallPath]:
         return [self.paths[part.shape.name] for part in body.parts]

@@ -46,12 +46,14 @@ class StartFrame:
         moved: Free objects that hands push before they hold them, by name: frames and placements.
         began: Initial positions of these [m], shape (3,), by name.
         falls: Messages about objects that fell.
+        interrupted: Frame after which Ctrl-C ended the falls, so that nothing is solved; None if nothing did.
     """
 
     start: float
     moved: dict[str, tuple[list[float], list[Places]]]
     began: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     falls: tuple[str, ...] = ()
+    interrupted: float | None = None
 
     def place(self, name: str) -> Places | None:
         """Placement of a free object at the start; None if it is the animation's."""

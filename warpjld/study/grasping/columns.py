@@ -80,7 +80,8 @@ PRESSED_COLUMNS = (
     Column("muscle_share", "number", "", "Largest share of the muscles' limits, in force or in a joint's torque."),
     Column("strained", "text", "", "Digit that has it."),
     Column("without_share", "text", "", "Digits that press with less than their share, as far as they may bend on: by"
-           " how much their skin stays short of the object; touching, if they slip off or reach too little."),
+           " how much their skin stays short of the object; touching, if they slip off or reach too little;"
+           " on bone, if flesh of coarse elements lets a bone come to the object."),
     *(Column(f"force_{part}", "number", "N", f"Length of the sum of the contact forces on the skin of the {part}.")
       for part in _PARTS),
     *(Column(f"pressed_area_{part}", "number", "m²", f"Skin of the {part} under pressure.") for part in _PARTS),

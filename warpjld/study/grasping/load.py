@@ -72,16 +72,18 @@ class Thing:
         body: The object.
         mass: Its mass [kg].
         radius: Largest distance of its surface from its centre of mass [m].
+        device: Warp device of its search structures.
     """
 
     body: GraspObject
     mass: float
     radius: float
+    device: str = "cpu"
 
     @cached_property
     def near(self) -> NearObject:
         """Its search structures, for all hands."""
-        return NearObject(self.body)
+        return NearObject(self.body, self.device)
 
 
 def device_identity(device: str) -> dict[str, str]:
@@ -143,8 +145,8 @@ def _angles(skeleton: Skeleton, posture: tuple[tuple[str, str, float], ...], nam
 
 
 @lru_cache(maxsize=32)
-def thing_of(choice: ObjectChoice, scale: float, density: float) -> Thing:
-    """Build or read an object at a scale; cached for the process.
+def thing_of(choice: ObjectChoice, scale: float, density: float, device: str = "cpu") -> Thing:
+    """Build or read an object at a scale, with search structures on a device; cached for the process.
 
     Raises:
         InputError: It cannot be used, or has neither volume nor mass.
@@ -155,15 +157,15 @@ def thing_of(choice: ObjectChoice, scale: float, density: float) -> Thing:
     if not mass > 0.0:
         raise InputError(f"object {choice.name}: encloses no volume; give it a mass")
     radius = float(np.linalg.norm(body.vertices - body.centroid, axis=1).max())
-    return Thing(body, mass, radius)
+    return Thing(body, mass, radius, device)
 
 
 @lru_cache(maxsize=32)
-def closer_of(choice: HandChoice, wanted: ObjectChoice, scale: float, density: float) -> Closer:
-    """``Closer`` of a hand on an object; cached for the process.
+def closer_of(choice: HandChoice, wanted: ObjectChoice, scale: float, density: float, device: str = "cpu") -> Closer:
+    """``Closer`` of a hand on an object, on a device; cached for the process.
 
     Raises:
         InputError: Hand or object cannot be used.
     """
-    thing = thing_of(wanted, scale, density)
+    thing = thing_of(wanted, scale, density, device)
     return Closer(hand_of(choice).covering, thing.body, thing.near)

@@ -69,7 +69,7 @@ def press_grasp(
     """
     asked = how.force(weight, friction)
     short = digits_short_of(hand, thing, angles, position, rotation, most=float(np.radians(how.most)))
-    values: dict[str, Any] = {"asked_force": asked, "success": False, "without_share": _without_share(short, ())}
+    values: dict[str, Any] = {"asked_force": asked, "success": False, "without_share": _without_share(short)}
     if len(short) == len(DIGITS):
         return values | {"press": ForceStatus.NO_CONTACT.name}, None, ForceStatus.NO_CONTACT.value
     closing = np.array(_CLOSING)[:, None, None] * (angles - start) + start
@@ -86,7 +86,7 @@ def press_grasp(
         return values | {"press": ForceStatus.NO_SOLUTION.name}, None, str(error)
     values["press"] = _ending(found)
     if found.grips:
-        values["without_share"] = _without_share(short, found.grips[0].left_out)
+        values["without_share"] = _without_share(short, found.grips[0].left_out, found.grips[0].on_bone)
     if not found.grips or not len(found.frames) or found.frames[-1] <= _CLOSED:
         return values, None, found.verdict.text
     last = float(found.frames[-1])
@@ -123,10 +123,15 @@ def _ending(found: Simulation) -> str:
     return found.grips[0].status if found.grips and found.verdict.status == "CONVERGED" else found.verdict.status
 
 
-def _without_share(short: Mapping[str, float], left_out: Sequence[str]) -> str:
-    """Digits that press with less than their share, and by how much they fail to reach the object."""
+def _without_share(short: Mapping[str, float], left_out: Sequence[str] = (), on_bone: Sequence[str] = ()) -> str:
+    """Digits that press with less than their share, and why: short of the object, touching, or stopped by a bone."""
     named = [f"{digit} {1e3 * short[digit]:.1f} mm short" for digit in DIGITS if digit in short]
-    return ", ".join([*named, *(f"{digit} touching" for digit in left_out if digit not in short)])
+    return ", ".join(
+        [
+            *named,
+            *(f"{digit} {'on bone' if digit in on_bone else 'touching'}" for digit in left_out if digit not in short),
+        ]
+    )
 
 
 def _measured(found: Simulation, rows: list[ContactRow]) -> dict[str, Any]:

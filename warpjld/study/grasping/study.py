@@ -21,7 +21,8 @@ class Study:
 
     Attributes:
         plan: The plan.
-        device: Warp device of the covering of closed hands; all else is computed on the CPU.
+        device: Warp device of closing hands, distances to objects and the covering of closed hands; all else is
+            computed on the CPU.
 
     Examples:
         >>> from tempfile import mkdtemp

@@ -46,7 +46,7 @@ class GraspExperiment:
 
     Attributes:
         settings: The plan.
-        device: Warp device of the covering of closed hands; all else is computed on the CPU.
+        device: Warp device of closing hands, distances to objects and the covering of closed hands.
     """
 
     settings: GraspPlan
@@ -305,10 +305,10 @@ class GraspExperiment:
         return draw_grasp(hand_of(choice), self._thing(wanted, scale).body, trial, outcome, folder)
 
     def _thing(self, choice: ObjectChoice, scale: float) -> Thing:
-        return thing_of(choice, scale, self.settings.measuring.density)
+        return thing_of(choice, scale, self.settings.measuring.density, self.device)
 
     def _closer(self, hand: HandChoice, choice: ObjectChoice, scale: float) -> Closer:
-        return closer_of(hand, choice, scale, self.settings.measuring.density)
+        return closer_of(hand, choice, scale, self.settings.measuring.density, self.device)
 
 
 def _as_in_a_plan(unit: str) -> str:

@@ -113,7 +113,7 @@ class ScoreExperiment:
         """Deform the skin, and measure."""
         scored = self.scored[trial]
         grasp = scored.grasp
-        hand, thing = hand_of(scored.hand), thing_of(scored.thing, grasp.scale, self.measuring.density)
+        hand, thing = hand_of(scored.hand), thing_of(scored.thing, grasp.scale, self.measuring.density, self.device)
         poses = grasp.poses(hand.rig.skeleton)
         values: dict[str, Any] = {}
         if poses is None:
@@ -124,7 +124,7 @@ class ScoreExperiment:
             wrist = grasp.place.to_local(poses.positions[0, [hand.rig.skeleton.index("wrist")]])[0, 0]
             values |= dict(zip(("wrist_x", "wrist_y", "wrist_z"), wrist, strict=True))
         local = skin if _at_origin(grasp) else grasp.place.to_local(skin)[0].astype(np.float32)
-        both = closer_of(scored.hand, scored.thing, grasp.scale, self.measuring.density).both
+        both = closer_of(scored.hand, scored.thing, grasp.scale, self.measuring.density, self.device).both
         (touching,) = touching_skins(hand, thing, local[None], self.measuring.contact)
         measured = measure_grasp(hand, thing, both, touching, scored.friction, self.measuring)
         arrays = {} if grasp.angles is None else {f"{scored.hand.name}/angles": grasp.angles}
@@ -143,7 +143,7 @@ class ScoreExperiment:
             notes += [f"{hand.name}: {note}" for note in rig.notes]
             doubts += [f"{hand.name}: {doubt}" for doubt in rig.suspicious]
         for thing, scale in {(item.thing, item.grasp.scale): None for item in self.scored}:
-            body = thing_of(thing, scale, self.measuring.density).body
+            body = thing_of(thing, scale, self.measuring.density, self.device).body
             notes += [f"{thing.name}: {note}" for note in body.report.notes()]
         return notes, doubts
 
