@@ -201,14 +201,16 @@ class RestShape:
         carried = self.skin[inside] + np.einsum(
             "pa,pai->pi", embedding.weights[inside], displacement[embedding.corners[inside]]
         )
-        if moves is not None:
-            base = self.start.to(moves).blended(self.skin_weights, self.skin[inside])
-            change = np.zeros_like(out)
-            change[inside] = carried - base
-            carried = base + smoothed(change)[inside]
         share = self.blend[inside, None]
-        out[inside] = share * carried + (1.0 - share) * out[inside]
-        return out
+        if moves is None:
+            out[inside] = share * carried + (1.0 - share) * out[inside]
+            return out
+        # smoothed as it is blended: at a cut, where elements end, what they carry counts for nothing
+        base = self.start.to(moves).blended(self.skin_weights, self.skin[inside])
+        change = np.zeros_like(out)
+        change[inside] = share * (carried - base)
+        out[inside] = share * base + (1.0 - share) * out[inside]
+        return np.asarray(out + smoothed(change))
 
     @cached_property
     def skin_weights(self) -> NDArray[np.float64]:
