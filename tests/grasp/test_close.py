@@ -170,6 +170,7 @@ def test_parts_by_name(covering) -> None:
     last = part_vertices(covering, "index.knuckle3")
     assert set(last) < set(part_vertices(covering, "left.index")) == set(part_vertices(covering, "INDEX"))
     assert pad_vertex(covering, "index") in last
+    assert set(part_vertices(covering, "left.hand")) > set(part_vertices(covering, "index"))  # as anatomy calls it
     assert len(part_vertices(covering, None)) == len(covering.surface.vertices)
     with pytest.raises(InputError, match="did you mean index"):
         part_vertices(covering, "indx")

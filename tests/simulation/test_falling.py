@@ -219,6 +219,28 @@ def test_what_is_let_go_falls() -> None:
 
 
 @pytest.mark.slow
+def test_bonded_pieces_that_are_let_go_fall_as_one_and_part_on_impact() -> None:
+    """HOLD of one of two pieces ends at frame 3; the impact on the floor opens their bond. Neither lies in the other."""
+    scene, found = run(
+        "RATE 30\nFRAMES 0 12\nGRAVITY 0 -9.81 0\nFRICTION 0.4\nOBJECT FLOOR BOX 0.40 0.02 0.30 AT 0 -0.01 0\n"
+        "OBJECT BAR BOX 0.12 0.02 0.02 AT 0 0.05 0\nPHYSICAL BAR YOUNG 1e6 POISSON 0.3 ELEMENT 0.02\n"
+        "PIECES BAR 2 BOND 30000\nPOINTS BAR_1 TOP UPPER Y 0.05\nHOLD BAR_1 TOP 3\nPRESS 0 12 EVERY 3\n"
+    )
+    assert found.verdict.status == "RELEASED"
+    assert not found.verdict.failed
+    assert "nothing holds 'BAR_1' and 'BAR_2'" in found.verdict.text
+    assert "BAR_1 and BAR_2 are held by nothing: they fall from frame 3 on" in found.verdict.text
+    # from the height at which it hung: 0.03 m above the floor or a little less, as it sags
+    assert "the bond of BAR_1 and BAR_2 opens at frame 5." in found.verdict.text
+    one, other = (found.surfaces.object(name, 12.0) for name in ("BAR_1", "BAR_2"))
+    assert one is not None
+    assert other is not None
+    for shape in (one, other):
+        assert shape[:, 1].min() == pytest.approx(0.0, abs=1e-4)
+    assert one[:, 0].max() < other[:, 0].min() + 1e-4
+
+
+@pytest.mark.slow
 def test_a_ball_at_rest_is_flattened_by_its_weight() -> None:
     """A soft ball that fell on a table is solved at rest: its height falls by Hertz's approach (Johnson 1985, §4.2)."""
     _, found = run(

@@ -73,7 +73,7 @@ def test_no_farther_than_allowed() -> None:
     assert np.linalg.norm(found - shown, axis=1).max() <= MOST * (1.0 + 1e-9)
 
 
-def test_a_fold_returns_to_the_covering() -> None:
+def test_a_fold_returns_to_what_is_not_smoothed() -> None:
     rest, faces = hose()
     skin, shown = crossings(rest, faces), rest.copy()
     one, other = slice(380, 400), slice(400, 420)  # two rings change places, and bulge

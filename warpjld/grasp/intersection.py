@@ -14,6 +14,7 @@ from warpjld.grasp.covering_cache import kept_with
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import GraspObject, Places
 from warpjld.grasp.posed_skins import PosedSkins
+from warpjld.skeleton.segments import SEGMENT_JOINTS, segment_joints
 from warpjld.suggest import did_you_mean
 
 __all__ = ["Contact", "Intersection", "contacts", "intersection", "intersection_beside", "part_vertices"]
@@ -76,7 +77,8 @@ class Contact:
 def part_vertices(covering: Covering, part: str | None) -> NDArray[np.int32]:
     """Indices of the vertices of a part of the surface.
 
-    ``index.knuckle2`` is the segment that begins at that joint, ``index`` a digit, ``palm`` the palm, None everything.
+    ``index.knuckle2`` is the segment that begins at that joint, ``index`` a digit, ``palm`` the palm, ``left.forearm``
+    what anatomy calls so (:func:`~warpjld.skeleton.segments.segment_joints`), None everything.
 
     Raises:
         InputError: There is no such part; suggests the nearest.
@@ -91,6 +93,10 @@ def part_vertices(covering: Covering, part: str | None) -> NDArray[np.int32]:
         for k, fan in enumerate(covering.fans)
         if wanted in (fan.name, short[k]) or fan.name.startswith(f"{wanted}.") or short[k].startswith(f"{wanted}.")
     ]
+    word = wanted.rpartition(".")[2]
+    if not chosen and word in SEGMENT_JOINTS:
+        joints = {covering.skeleton.names[joint] for joint in segment_joints(covering.skeleton, wanted)}
+        chosen = [k for k, fan in enumerate(covering.fans) if fan.name in joints]
     if not chosen:
         known = {*(fan.name for fan in covering.fans), *short, *(name.partition(".")[0] for name in short)}
         raise InputError(f"no part '{part}' in this surface{did_you_mean(wanted, sorted(known))}")

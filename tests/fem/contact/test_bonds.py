@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from tests.fem.contact.bodies import named, together
-from warpjld.fem import Body, LinearElastic, Prescribed, box_hexes, prescribe
+from warpjld.fem import Body, LinearElastic, Loads, Prescribed, SolveStatus, box_hexes, prescribe
 from warpjld.fem.contact import Bond, ContactSolution, Pair, press
+from warpjld.fem.contact.obstacles.solids import Plane
 
 YOUNG = 1e6
 HALF = 0.05
 LAW = LinearElastic(YOUNG, 0.0)
+NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
 
 
 def stack() -> Body:
@@ -118,3 +120,21 @@ def test_a_bond_to_nothing_is_refused() -> None:
     body = together({"a": (named(lower, "a"), LAW), "b": (named(upper, "b", (0, 0, 1.0)), LAW)})
     with pytest.raises(InputError, match="a bond to nothing"):
         press(body, pulled(body, (0.0, 0.0, 0.0)), [Pair("a.z+", "b.z-", bond=Bond())])
+
+
+def test_bonded_bodies_that_nothing_holds_are_named_together() -> None:
+    """Each is held by the other, and both by nothing: not a matter of the stiffness."""
+    body = stack()
+    bond = Pair("a.z+", "b.z-", bond=Bond(normal=2e4))
+    found = press(body, NOTHING, [bond], Loads(gravity=(0.0, 0.0, -9.81)), times=(1.0,), check=False)
+    assert found.status is SolveStatus.UNHELD
+    assert "nothing holds 'a' and 'b'" in found.message
+
+
+def test_bonded_bodies_stand_on_what_holds_one_of_them() -> None:
+    body = stack()
+    bond, floor = Pair("a.z+", "b.z-", bond=Bond(normal=2e4)), Pair("a.z-", Plane((0, 0, 0), (0, 0, 1)), 0.5)
+    found = press(body, NOTHING, [bond, floor], Loads(gravity=(0.0, 0.0, -9.81)), times=(1.0,))
+    assert found.converged
+    weight = 9.81 * 1e-3 * LAW.density
+    assert found.last.touches[1].force[2] == pytest.approx(weight, rel=1e-3)

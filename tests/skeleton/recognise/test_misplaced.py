@@ -125,6 +125,21 @@ def test_rigs_of_others_as_shipped(data, name):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("joint", "offset"),
+    [
+        ("left.hip", (0.05, 0.0, 0.0)),
+        ("right.hip", (-0.05, 0.0, 0.0)),
+        ("left.shoulder", (0.0, -0.05, 0.0)),  # out of the surface
+        ("left.knee", (0.0, 0.08, 0.0)),
+    ],
+)
+def test_a_body_of_many_pieces(data, joint, offset):
+    """Rays from its joints meet inner pieces, so that the flesh around a place says little."""
+    check_named(load_rig(data / "body_mesh2motion_mannequin/human-male.glb"), joint, np.array(offset), 0.5)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(

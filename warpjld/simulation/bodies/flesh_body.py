@@ -135,6 +135,16 @@ class FleshBody(DeformableBody):
         assert covered is not None
         return self.shape.deformed(displacement, covered)
 
+    def shown(
+        self,
+        displacement: NDArray[np.float64],
+        covered: NDArray[np.floating],
+        time: float,
+        smoothed: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    ) -> NDArray[np.float64]:
+        """As ``deformed``, where ``smoothed`` smooths what the flesh adds to the motion of the bones at a time."""
+        return self.shape.deformed(displacement, covered, smoothed, self.moves(time))
+
     def prescribed(self, time: float, history: History | None = None) -> Prescribed:
         """Displacements of the bones' nodes and of the cut nodes."""
         return _held_by_bones(self.shape, self.moves(time))

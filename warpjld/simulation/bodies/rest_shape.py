@@ -8,8 +8,9 @@ flesh is meshed, the surface is the covering's (JLD).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,9 +179,22 @@ class RestShape:
     blend: NDArray[np.float64]
     skin: NDArray[np.float64]
 
-    def deformed(self, displacement: NDArray[np.float64], covered: NDArray[np.floating]) -> NDArray[np.float64]:
+    def deformed(
+        self,
+        displacement: NDArray[np.float64],
+        covered: NDArray[np.floating],
+        smoothed: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda change: change,
+        moves: Moves | None = None,
+    ) -> NDArray[np.float64]:
         """Surface of the rig [m], shape (V, 3): displaced with the flesh (N, 3) where it is meshed, ``covered`` (V, 3)
-        elsewhere, blended in between."""
+        elsewhere, blended in between.
+
+        Args:
+            displacement: Of the nodes [m], shape (N, 3).
+            covered: Surface as the covering deforms it [m], shape (V, 3).
+            smoothed: Smooths what flesh adds to the motion of the bones (V, 3).
+            moves: Rigid motions of the bones from the rig's rest; needed with ``smoothed``.
+        """
         inside = self.blend > 0.0
         out = np.array(covered, dtype=np.float64)
         embedding = self.hand.flesh.skin
@@ -188,8 +202,23 @@ class RestShape:
             "pa,pai->pi", embedding.weights[inside], displacement[embedding.corners[inside]]
         )
         share = self.blend[inside, None]
-        out[inside] = share * carried + (1.0 - share) * out[inside]
-        return out
+        if moves is None:
+            out[inside] = share * carried + (1.0 - share) * out[inside]
+            return out
+        # smoothed as it is blended: at a cut, where elements end, what they carry counts for nothing
+        base = self.start.to(moves).blended(self.skin_weights, self.skin[inside])
+        change = np.zeros_like(out)
+        change[inside] = share * (carried - base)
+        out[inside] = share * base + (1.0 - share) * out[inside]
+        return np.asarray(out + smoothed(change))
+
+    @cached_property
+    def skin_weights(self) -> NDArray[np.float64]:
+        """Weights of the bones at the skin vertices with flesh, rows summing to one, shape (v, B)."""
+        embedding, inside = self.hand.flesh.skin, self.blend > 0.0
+        nodal = self.hand.weights[embedding.corners[inside]]
+        out = np.maximum(np.einsum("pa,pab->pb", embedding.weights[inside], nodal), 0.0)
+        return np.asarray(out / out.sum(axis=1, keepdims=True))
 
 
 def cut_to_digits(hand: FleshHand, poses: Poses, skin: NDArray[np.float64], digits: Sequence[str] = ()) -> RestShape:

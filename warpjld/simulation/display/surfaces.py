@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.grasp import Places
+from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.surface_offset import element_edge
 from warpjld.simulation.display.pressure_map import PressureMap, pressure_map
@@ -121,9 +122,10 @@ class DeformedSurfaces:
         out = {}
         for body in self.model.bodies:
             name, covered = body.name, skins.get(body.name)
-            at = body.deformed(moved[self.model.spans[name]], covered)
-            if covered is not None:
-                at = covered + self._smoothers[name].of(at - covered)
+            own = moved[self.model.spans[name]]
+            plain = at = body.deformed(own, covered)
+            if isinstance(body, FleshBody) and covered is not None:
+                at = body.shown(own, covered, frame - self.model.start, self._smoothers[name].of)
             out[name] = VisibleSurface(
                 at,
                 body.triangles,
@@ -132,7 +134,7 @@ class DeformedSurfaces:
                 body.parts,
                 body.pressing,
                 self._crossings.get(name),
-                covered,
+                plain,
             )
         return out
 

@@ -4,8 +4,8 @@ Contact keeps element faces apart on average. In a crease, where skin of two seg
 visible skin passes through itself by a fraction of an element, along whatever segments meet there. Faces that cross
 are found, not parts that overlap, so that no partition of the skin is needed: skin of both sides retreats along its
 normals, evenly over an element's edge around the crossing, until no two faces cross or it has moved as far as is
-allowed. Faces that cross although they lie side by side on the skin are folded, not pressed on each other; there the
-skin returns to the covering's, which does not fold.
+allowed. Faces that cross although they lie side by side on the skin are folded by smoothing, not pressed on each other;
+there the skin returns to that which elements carry, none of which is turned inside out.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = ["SkinCrossings", "uncrossed"]
 _STEP = 0.08
 """Retreat a round, as a share of the largest one: finer steps retreat less too far, and take as much longer."""
 _RETURN = 0.2
-"""Part of the way back to the covering's skin a round."""
+"""Part of the way back to the skin as elements carry it a round."""
 _ROUNDS = 40
 """Most rounds: thrice what full retreat takes; more are needed only where crossings spread."""
 
@@ -89,14 +89,14 @@ class SkinCrossings:
 
 
 def uncrossed(
-    skin: SkinCrossings, at: NDArray[np.float64], covered: NDArray[np.float64], most: float
+    skin: SkinCrossings, at: NDArray[np.float64], plain: NDArray[np.float64], most: float
 ) -> NDArray[np.float64]:
     """Positions of a skin's vertices [m], shape (V, 3), after skin that passes through itself has been drawn back.
 
     Args:
         skin: The skin.
         at: Its vertices [m], shape (V, 3).
-        covered: The same as the covering deforms them [m], shape (V, 3).
+        plain: The same as elements carry them, not smoothed [m], shape (V, 3).
         most: Largest retreat of a vertex [m]; what crosses beyond it still does.
     """
     pairs = skin.pairs(at)
@@ -116,7 +116,7 @@ def uncrossed(
         if len(folds):
             back = np.minimum(1.0, back + _RETURN * skin.around(folds))
         out = at + retreat[:, None] * inward
-        out += back[:, None] * (covered - out)
+        out += back[:, None] * (plain - out)
         pairs = skin.pairs(out)
         if not len(pairs):
             break

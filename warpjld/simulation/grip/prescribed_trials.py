@@ -77,9 +77,16 @@ class PrescribedTrials(WeightTrials):
         )
 
     def closed(self, grip: float) -> ContactSolution:
-        """Equilibrium at the grip without gravity."""
+        """Equilibrium at the grip without gravity, after that at the largest known grip below it."""
         if grip not in self._closed:
-            self._closed[grip] = self._press(lambda time: self._at(grip, time), self._loads, 1.0)
+            less = max((one for one, found in self._closed.items() if one < grip and found.converged), default=0.0)
+            before = self._closed.get(less)
+            begin = 0.0 if before is None else before.last.time
+
+            def known(time: float) -> Prescribed:
+                return self.prescribed(less + min(time - begin, 1.0) * (grip - less))
+
+            self._closed[grip] = self._press(known, self._loads, begin + 1.0, before)
         return self._closed[grip]
 
     def held(self, grip: float) -> NDArray[np.int64]:

@@ -27,6 +27,10 @@ _HALVES = 1.32  # largest ratio of a limb's halves: 1.02 to 1.13 are usual, knee
 _ASIDE = 0.012  # tolerance from the midline, or from the mirror image, per height of the body
 _HAND_ASIDE = 0.0035  # likewise in hands and feet, whose joints are closer together
 _ALIKE = 0.004  # largest median asymmetry of a symmetric rest pose, per height of the body
+_SCALE = 0.5
+"""Oddity of a hip or shoulder as far from its usual place as is tolerated: that of a place with thrice the flesh on one
+side (0.5), so that neither measure outweighs the other. Flesh of many pieces, of which rays meet inner ones, says
+little."""
 _CLEARLY = 1.25  # ratio of oddities at which one side is clearly the wrong one
 _USUAL = {"hip": (0.055, 0.53), "shoulder": (0.1, 0.8)}
 """Distances from the midline and from the floor, per height of the body (Drillis, Contini 1966)."""
@@ -127,7 +131,8 @@ def _oddity(
     """How unusual a joint's position is: by body proportions, or by length differences and bends of its bones."""
     if name in _USUAL:
         aside, high = _USUAL[name]
-        return float(np.hypot(abs((place - middle) @ left) / height - aside, ((place @ up) - floor) / height - high))
+        off = np.hypot(abs((place - middle) @ left) / height - aside, ((place @ up) - floor) / height - high)
+        return float(_SCALE * off / _ASIDE)
     for limb in _LIMBS:
         if name in limb:
             a, b, c = (joints.get(f"{side}.{joint}") for joint in limb)

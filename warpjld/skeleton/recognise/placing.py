@@ -99,13 +99,17 @@ def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
 
 
 def _one_per_joint(findings: list[Finding]) -> list[Finding]:
-    """One finding per joint: the first, completed by the first proposal found for that joint."""
+    """One finding per joint: the first, completed by the first proposal found for that joint.
+
+    Of a joint outside, the nearest place inside is proposed only where nothing else says where it belongs."""
     best: dict[str, Finding] = {}
     for one in findings:
         had = best.get(one.joint)
         if had is None:
             best[one.joint] = one
-        elif had.proposal is None and one.proposal is not None and had.kind != "coincident":
+        elif one.proposal is None or had.kind == "coincident":
+            continue
+        elif had.proposal is None or (had.kind == "outside" and one.kind in ("proportion", "asymmetric", "midline")):
             detail = ", ".join(part for part in (had.detail, one.detail) if part)
             best[one.joint] = replace(had, proposal=one.proposal, detail=detail)
     return list(best.values())

@@ -59,6 +59,8 @@ _FAR = 2.2
 """Search distance over the initial overlap that has to be removed; contact fades beyond half of it."""
 _PART = 0.85
 """Fraction of the last step's correction that a predictor adds: contact stiffens, so corrections decrease."""
+_STAYS = 1e-9
+"""Change of a prescribed displacement, over the bodies' size, that is none."""
 
 Guess = Callable[[float, float, Array], Array]
 """Predictor: time before, time, displacement before (N, 3) → guess of the displacement at the time (N, 3)."""
@@ -326,8 +328,11 @@ class LoadSteps:
         return np.asarray(self.guess(step.before, step.time, self.u.reshape(-1, 3)), dtype=np.float64).reshape(-1)
 
     def _guesses(self, step: LoadStep, carried: Array) -> list[Array]:
-        """Initial guesses: the predictor with the last step's correction repeated, and the predictor alone."""
-        plain = [] if self.guess is None and step.inertia is None else [carried]
+        """Initial guesses: the predictor with the last step's correction repeated, and the predictor alone; the latter
+        also without a predictor of the caller if nothing prescribed moves, as where a body is let go."""
+        known = step.prescribed
+        stays = bool(np.abs(known.values - self.u[known.degrees]).max(initial=0.0) <= _STAYS * self.body.mesh.size)
+        plain = [carried] if stays or self.guess is not None or step.inertia is not None else []
         if self.correction_rate is None:
             return plain
         return [carried + _PART * (step.time - step.before) * self.correction_rate.reshape(-1), *plain]
