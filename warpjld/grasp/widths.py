@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,8 +83,8 @@ def _followed(
     from warpjld_kernels.lines_to_object import follow_through
 
     along, leaves = np.full(len(start), 20.0 * _SURFACE), np.empty(len(start), dtype=np.int32)
-    kinds = (wp.vec3d, wp.vec3d, wp.float64, wp.int32)
-    arrays = [shared_on(near.device, a, kind) for a, kind in zip((start, line, along, leaves), kinds, strict=True)]
+    given: list[tuple[NDArray, Any]] = [(start, wp.vec3d), (line, wp.vec3d), (along, wp.float64), (leaves, wp.int32)]
+    arrays = [shared_on(near.device, values, kind) for values, kind in given]
     inputs = [near.objects.solids, *arrays[:2], _SURFACE, widest, _STEPS, *arrays[2:]]
     wp.launch(follow_through, len(start), inputs=inputs, device=near.device)
     return arrays[2].numpy(), arrays[3].numpy()
