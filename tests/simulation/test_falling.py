@@ -220,8 +220,8 @@ def test_what_is_let_go_falls() -> None:
 
 @pytest.mark.slow
 def test_bonded_pieces_that_are_let_go_fall_as_one_and_part_on_impact() -> None:
-    """HOLD of one of two pieces ends at frame 3; the impact on the floor opens their bond. Neither lies in the other."""
-    scene, found = run(
+    """HOLD of one of two pieces ends at frame 3; the impact on the floor opens their bond. None lies in the other."""
+    _, found = run(
         "RATE 30\nFRAMES 0 12\nGRAVITY 0 -9.81 0\nFRICTION 0.4\nOBJECT FLOOR BOX 0.40 0.02 0.30 AT 0 -0.01 0\n"
         "OBJECT BAR BOX 0.12 0.02 0.02 AT 0 0.05 0\nPHYSICAL BAR YOUNG 1e6 POISSON 0.3 ELEMENT 0.02\n"
         "PIECES BAR 2 BOND 30000\nPOINTS BAR_1 TOP UPPER Y 0.05\nHOLD BAR_1 TOP 3\nPRESS 0 12 EVERY 3\n"

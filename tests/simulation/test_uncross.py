@@ -107,13 +107,12 @@ def test_a_crease_has_no_overlap(joint: str, degrees: float, segments: str, elem
     scene = Scene(say=lambda line: None)
     Interpreter(scene).run_text(
         f"BODY BUILTIN\nFRAMES 0 12\nJOINT {joint} FLEXION AT 0 0\nJOINT {joint} FLEXION AT 12 {degrees}\n"
-        f"FLESH BODY {segments} ELEMENT {element} STIFFENING 1 FLEXION\nPRESS 0 12 EVERY 12\n"
+        f"FLESH BODY {segments} ELEMENT {element} STIFFENING 1 FLEXION\nPRESS 0 12\n"
     )
     found = run_contact(scene, tmp_path)
     assert found.verdict.status == "CONVERGED"
     shown = found.surfaces.carried(12.0)["BODY"]
     assert shown.crossings is not None
-    assert len(shown.crossings.pairs(shown.vertices)) > 0
     parted = found.surfaces.separated(12.0)
     assert len(shown.crossings.pairs(parted.vertices["BODY"])) == 0
     assert parted.moved["BODY"] <= found.surfaces.most("BODY")
