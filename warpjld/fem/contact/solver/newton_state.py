@@ -42,8 +42,9 @@ found where they stick before: steps in which three fingers first touched a ball
 _ALIGNED, _ALIGNED_FREE = 0.005, 0.05
 """Residual below which friction that is bounded by the current pressure also has the direction of its trial traction,
 and the same where a body is held by contact alone: the direction found in the fixed-point phase comes nearer by a
-factor of about 0.6 an iteration only. Steps of a block between two fingertips took 7 solves instead of 10 or 11, those of
-a ball between thumb and finger 9 instead of 11; with 0.05 a hand that closed on a box took 5.8 a step instead of 4.4."""
+factor of about 0.6 an iteration only. Steps of a block between two fingertips took 7 solves instead of 10 or 11, those
+of a ball between thumb and finger 9 to 11 instead of 11; with 0.05 a hand that closed on a box took 5.8 a step instead
+of 4.4."""
 _SHORT, _STUMBLES = 0.1, 2
 """Step length of coupled friction beside sticking points that counts as a stumble, and number of stumbles after which
 friction is no longer coupled: points at the limit of sticking alternate then."""
