@@ -19,8 +19,8 @@ _TORN = 3.0
 """Friction in excess of Coulomb's bound, over that bound, above which the pressures of the same solve are discarded."""
 _SHEARED = 200.0
 """Penalty times slip, over μ p, above which a point slides when friction begins to act. As ε is 200 E*/edge, elements
-sheared by that slip would bear about E* slip/edge > μ p. With 1 instead of 200, hands closed on a ball and on a box
-with a tenth more linear solves."""
+sheared by that slip would bear about E* slip/edge > μ p. With 1 instead of 200, a hand closed on a ball with a fifth
+more linear solves, and on a box and a can with as many."""
 
 
 def update_multipliers(
@@ -152,7 +152,7 @@ def _sliding_first(
 ) -> tuple[Array, Mask]:
     """Friction and stick state where friction begins to act after slips ``moved`` (m, 3) without it.
 
-    A point slides, with μ p against its slip, if the flesh could not have borne that slip by sticking (``_SHEARED``);
+    A point slides, with μ p against its slip, if the body could not have borne that slip by sticking (``_SHEARED``);
     it sticks later if friction moves it the other way. If all points began by sticking, the load would be borne by
     those nearest to where it acts, and sliding would spread by one row of points in each linear solve (a belt halfway
     around a cylinder: 15 rows).

@@ -21,7 +21,8 @@ E is the non-symmetric part of the tangent: derivatives of mortar weights and no
 friction with respect to pressure; with it (4) is solved by GMRES preconditioned by K + H.
 
 A load step (``load_steps``, ``contact_newton``) starts from u and λ of the previous step, at the predictor with the
-smallest residual (u carried along by the moving boundary conditions, with or without the last step's correction); if
+smallest residual (u carried along by the moving boundary conditions, or u itself if these stand still, with or without
+the last step's correction); if
 that fails, at u itself, with the Dirichlet values applied in the first Newton step. Iterations:
 
 1. ``newton_state.assemble``: R of (1). The step ends when (6) holds and contact points searched again agree
@@ -43,8 +44,9 @@ that fails, at u itself, with the Dirichlet values applied in the first Newton s
    (by work, or by the residual if E is present) settles the active set.
    In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points
    touch, slide and stick in successive iterations (four where some stick, else two), as iterating over Tresca bounds
-   leaves up to 0.7 of the error each time. If sticking points change because of that, the bound is taken from the
-   previous solve again.
+   leaves up to 0.7 of the error each time; and once |R| is small, (3) is evaluated with its trial traction, since the
+   slip direction of the fixed-point phase converges as slowly. If sticking points change because of that, the bound is
+   taken from the previous solve again.
    If the contact points do not agree with those searched again at convergence, iterations continue in this phase, at
    most twice. Points are also searched again once a node has moved by a twentieth of an edge since the last search.
    At convergence, (2) and (3) are evaluated once more at the slip found (``confirmed``), since its direction may differ

@@ -39,6 +39,12 @@ _SAME, _SAME_STICKING = 2, 4
 between pressure and friction converges slowly): where all points slide, and where some stick. The latter have hardly
 found where they stick before: steps in which three fingers first touched a ball took 19 to 28 solves with 2, 11 with 4.
 """
+_ALIGNED, _ALIGNED_FREE = 0.005, 0.05
+"""Residual below which friction that is bounded by the current pressure also has the direction of its trial traction,
+and the same where a body is held by contact alone: the direction found in the fixed-point phase comes nearer by a
+factor of about 0.6 an iteration only. Steps of a block between two fingertips took 7 solves instead of 10 or 11, those
+of a ball between thumb and finger 9 to 11 instead of 11; with 0.05 a hand that closed on a box took 5.8 a step instead
+of 4.4."""
 _SHORT, _STUMBLES = 0.1, 2
 """Step length of coupled friction beside sticking points that counts as a stumble, and number of stumbles after which
 friction is no longer coupled: points at the limit of sticking alternate then."""
@@ -118,6 +124,7 @@ class NewtonState:
         self.jump = np.zeros_like(start)
         self._pressures: Array | None = None
         self._iteration, self._settled, self._same_for, self._stumbles = -1, False, 0, 0
+        self._aligned = False
         self.restarts = 0
         if guess is not None:
             self.u = guess_held(step, guess)
@@ -144,7 +151,7 @@ class NewtonState:
     @property
     def predicts(self) -> ActiveSet:
         """Rule for the active set after a linear solve."""
-        return ActiveSet.TRIAL if self.alternating else ActiveSet.PREDICTED
+        return ActiveSet.TRIAL if self.alternating or self._aligned else ActiveSet.PREDICTED
 
     @property
     def arrived(self) -> bool:
@@ -262,7 +269,9 @@ class NewtonState:
             self._stumbles += 1
         enough = _SAME_STICKING if sticks else _SAME
         coupled = same and (last or self._same_for >= enough) and not (sticks and self._stumbles >= _STUMBLES)
-        self.contact = self.forces(points, self.u, ActiveSet.TRIAL if last else ActiveSet.FROZEN, coupled=coupled)
+        self._aligned = coupled and self.unbalanced < (_ALIGNED if self.step.held else _ALIGNED_FREE)
+        rule = ActiveSet.TRIAL if last or self._aligned else ActiveSet.FROZEN
+        self.contact = self.forces(points, self.u, rule, coupled=coupled)
 
     def points_at(self, u: Array) -> list[ContactPoints]:
         """Contact points at displacement u (3N,), as used by a line search: those of the last search, moved, once
