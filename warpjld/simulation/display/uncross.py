@@ -93,6 +93,8 @@ def uncrossed(
 ) -> NDArray[np.float64]:
     """Positions of a skin's vertices [m], shape (V, 3), after skin that passes through itself has been drawn back.
 
+    Where crossings remain, the positions with the fewest of them.
+
     Args:
         skin: The skin.
         at: Its vertices [m], shape (V, 3).
@@ -105,7 +107,7 @@ def uncrossed(
     inward = -skin.smoother.of(vertex_normals(at, skin.faces).astype(np.float64))
     inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
     retreat, back = np.zeros(len(at)), np.zeros(len(at))
-    out = at
+    out, best, fewest = at, at, len(pairs)
     for _ in range(_ROUNDS):
         folded = skin.folded(pairs)
         pressed, folds = pairs[~folded], pairs[folded]
@@ -118,6 +120,8 @@ def uncrossed(
         out = at + retreat[:, None] * inward
         out += back[:, None] * (plain - out)
         pairs = skin.pairs(out)
+        if len(pairs) < fewest:
+            best, fewest = out, len(pairs)
         if not len(pairs):
             break
-    return out
+    return best
