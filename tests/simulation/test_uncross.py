@@ -57,7 +57,7 @@ def test_legs_of_one_hose_part_by_what_they_overlap() -> None:
     rest, faces = hose()
     skin, shown, apart = crossings(rest, faces), bent(rest, -0.03), bent(rest, 0.03)
     assert len(skin.pairs(shown)) > 20
-    found = uncrossed(skin, shown, apart, MOST)
+    found = uncrossed(skin, shown, (apart,), MOST)
     assert len(skin.pairs(found)) == 0
     away = np.linalg.norm(found - shown, axis=1)
     assert 0.015 <= away.max() < 0.03  # each side retreats by half of it, in steps
@@ -68,18 +68,18 @@ def test_legs_of_one_hose_part_by_what_they_overlap() -> None:
 def test_no_farther_than_allowed() -> None:
     rest, faces = hose()
     skin, shown = crossings(rest, faces), bent(rest, -0.2)
-    found = uncrossed(skin, shown, shown, MOST)
+    found = uncrossed(skin, shown, (shown,), MOST)
     assert len(skin.pairs(found)) > 0
     assert np.linalg.norm(found - shown, axis=1).max() <= MOST * (1.0 + 1e-9)
 
 
-def test_a_fold_returns_to_what_is_not_smoothed() -> None:
+def test_a_fold_returns_to_what_has_none() -> None:
     rest, faces = hose()
     skin, shown = crossings(rest, faces), rest.copy()
     one, other = slice(380, 400), slice(400, 420)  # two rings change places, and bulge
     shown[one], shown[other] = rest[other] * [1.05, 1.05, 1.0], rest[one] * [1.05, 1.05, 1.0]
     assert len(skin.pairs(shown)) > 0
-    found = uncrossed(skin, shown, rest, MOST)
+    found = uncrossed(skin, shown, (shown, rest), MOST)
     assert len(skin.pairs(found)) == 0
     far = np.abs(rest[:, 2]) > 2.0 * EDGE
     np.testing.assert_array_equal(found[far], shown[far])
@@ -91,7 +91,7 @@ def test_what_crosses_at_rest_or_has_no_flesh_stays() -> None:
     always = SkinCrossings(faces, overlapped, EDGE, np.ones(len(rest), dtype=bool), SurfaceSmoother(rest, faces, EDGE))
     assert len(always.pairs(overlapped)) == 0
     bare = SkinCrossings(faces, rest, EDGE, np.zeros(len(rest), dtype=bool), SurfaceSmoother(rest, faces, EDGE))
-    assert uncrossed(bare, overlapped, rest, MOST) is overlapped
+    assert uncrossed(bare, overlapped, (rest,), MOST) is overlapped
 
 
 @pytest.mark.slow

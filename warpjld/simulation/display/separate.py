@@ -37,7 +37,7 @@ class VisibleSurface:
         parts: Parts of it that may overlap one another; None if it has none.
         pressing: Mask of vertices whose overlap with other parts is resolved by contact, shape (V,); None: all.
         crossings: What finds crossings of the surface with itself; None if they are not removed.
-        plain: Vertices as elements carry them, not smoothed [m], shape (V, 3); None: as ``vertices``.
+        sound: Vertices that folds return to, each tried in turn [m], shape (V, 3): not smoothed, and the covering's.
     """
 
     vertices: NDArray[np.float64]
@@ -47,7 +47,7 @@ class VisibleSurface:
     parts: SkinParts | None = None
     pressing: NDArray[np.bool_] | None = None
     crossings: SkinCrossings | None = None
-    plain: NDArray[np.float64] | None = None
+    sound: tuple[NDArray[np.float64], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +172,8 @@ class _MovingSurface:
     def uncross(self) -> None:
         """Draw skin back that passes through itself."""
         shown = self.shown
-        if shown.crossings is not None and shown.plain is not None:
-            at = uncrossed(shown.crossings, self.at, shown.plain, shown.most)
+        if shown.crossings is not None:
+            at = uncrossed(shown.crossings, self.at, shown.sound, shown.most)
             self._facets_moved = self._facets_moved or at is not self.at
             self.at, self._between_parts = at, None
 

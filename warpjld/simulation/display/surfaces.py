@@ -134,7 +134,7 @@ class DeformedSurfaces:
                 body.parts,
                 body.pressing,
                 self._crossings.get(name),
-                plain,
+                () if covered is None else (plain, covered),
             )
         return out
 
@@ -167,7 +167,7 @@ class DeformedSurfaces:
             hand.name: SkinCrossings(
                 hand.triangles,
                 hand.hand.surface.vertices,
-                element_edge(hand.mesh, hand.faces),
+                max(element_edge(hand.mesh, hand.faces), 2.0 * _facet_edge(hand.surface, hand.triangles)),
                 hand.embedded & (hand.shape.blend > 0.0),
                 self._smoothers[hand.name],
             )
@@ -197,3 +197,9 @@ class DeformedSurfaces:
         after = int(np.clip(np.searchsorted(times, frame), 1, len(times) - 1))
         part = (frame - times[after - 1]) / (times[after] - times[after - 1])
         return np.asarray((1.0 - part) * values[after - 1] + part * values[after])
+
+
+def _facet_edge(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
+    """Median edge length of triangles [m]."""
+    x = vertices[faces]
+    return float(np.median(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))

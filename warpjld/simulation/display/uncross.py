@@ -5,11 +5,13 @@ visible skin passes through itself by a fraction of an element, along whatever s
 are found, not parts that overlap, so that no partition of the skin is needed: skin of both sides retreats along its
 normals, evenly over an element's edge around the crossing, until no two faces cross or it has moved as far as is
 allowed. Faces that cross although they lie side by side on the skin are folded by smoothing, not pressed on each other;
-there the skin returns to that which elements carry, none of which is turned inside out.
+there the skin returns to that which elements carry, none of which is turned inside out, or to the covering's, if facets
+of the skin larger than elements fold across a crease all the same.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -42,7 +44,7 @@ class SkinCrossings:
     Attributes:
         faces: Triangles of the skin, shape (T, 3).
         rest: Skin at the rig's rest [m], shape (V, 3).
-        edge: Edge of the elements [m].
+        edge: Edge of the elements, or of two facets of the skin where these are larger [m].
         moves: Mask of the vertices that deformable flesh carries, shape (V,).
         smoother: Smoother over an element's edge.
     """
@@ -89,23 +91,34 @@ class SkinCrossings:
 
 
 def uncrossed(
-    skin: SkinCrossings, at: NDArray[np.float64], plain: NDArray[np.float64], most: float
+    skin: SkinCrossings, at: NDArray[np.float64], sound: Sequence[NDArray[np.float64]], most: float
 ) -> NDArray[np.float64]:
     """Positions of a skin's vertices [m], shape (V, 3), after skin that passes through itself has been drawn back.
+
+    Where crossings remain, the positions with the fewest of them.
 
     Args:
         skin: The skin.
         at: Its vertices [m], shape (V, 3).
-        plain: The same as elements carry them, not smoothed [m], shape (V, 3).
+        sound: Positions that folds return to, each tried in turn [m], shape (V, 3).
         most: Largest retreat of a vertex [m]; what crosses beyond it still does.
     """
+    for goal in sound:
+        if not len(skin.pairs(at)):
+            break
+        at = _drawn_back(skin, at, goal, most)
+    return at
+
+
+def _drawn_back(
+    skin: SkinCrossings, at: NDArray[np.float64], sound: NDArray[np.float64], most: float
+) -> NDArray[np.float64]:
+    """Positions [m], shape (V, 3), with the fewest crossings while skin retreats, and folds return to ``sound``."""
     pairs = skin.pairs(at)
-    if not len(pairs):
-        return at
     inward = -skin.smoother.of(vertex_normals(at, skin.faces).astype(np.float64))
     inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
     retreat, back = np.zeros(len(at)), np.zeros(len(at))
-    out = at
+    out, best, fewest = at, at, len(pairs)
     for _ in range(_ROUNDS):
         folded = skin.folded(pairs)
         pressed, folds = pairs[~folded], pairs[folded]
@@ -116,8 +129,10 @@ def uncrossed(
         if len(folds):
             back = np.minimum(1.0, back + _RETURN * skin.around(folds))
         out = at + retreat[:, None] * inward
-        out += back[:, None] * (plain - out)
+        out += back[:, None] * (sound - out)
         pairs = skin.pairs(out)
+        if len(pairs) < fewest:
+            best, fewest = out, len(pairs)
         if not len(pairs):
             break
-    return out
+    return best
