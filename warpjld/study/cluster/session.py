@@ -18,6 +18,8 @@ _CONNECTS = 10.0  # time for the cluster's head to answer [s]
 _STORE = 200_000_000  # size of Ray's object store on this machine [bytes]; trials are small
 _ONE_THREAD = dict.fromkeys(THREAD_VARIABLES, "1")
 
+_NICENESS = "RAY_worker_niceness"  # by how much Ray's workers stand back; those of one machine are the work itself
+
 _inheriting = False  # whether the session is one of ``connected``, whose workers inherited the variables
 
 
@@ -25,8 +27,9 @@ _inheriting = False  # whether the session is one of ``connected``, whose worker
 def connected(address: str, processes: int | None = None) -> Iterator[dict[str, Any]]:
     """Context with a Ray connection: one that exists already, a new one to a cluster, or one of this machine.
 
-    Workers of a new session of this machine inherit the variables that bound libraries to one thread. Those of others
-    are given them by a runtime environment, for which Ray starts each worker anew.
+    Workers of a new session of this machine inherit the variables that bound libraries to one thread, and have the
+    priority of this process. Those of others are given the variables by a runtime environment, for which Ray starts
+    each worker anew.
 
     Args:
         address: Address of the cluster, or ``local``.
@@ -55,7 +58,7 @@ def connected(address: str, processes: int | None = None) -> Iterator[dict[str, 
     try:
         if local:
             own = {"num_cpus": processes or cores(), "object_store_memory": _STORE, "include_dashboard": False}
-            with _variables(_ONE_THREAD):
+            with _variables({**_ONE_THREAD, _NICENESS: os.environ.get(_NICENESS, "0")}):
                 ray.init(address="local", **own, **quiet)
         else:
             _listens(address)
