@@ -22,8 +22,8 @@ friction with respect to pressure; with it (4) is solved by GMRES preconditioned
 
 A load step (``load_steps``, ``contact_newton``) starts from u and λ of the previous step, at the predictor with the
 smallest residual (u carried along by the moving boundary conditions, or u itself if these stand still, with or without
-the last step's correction); if
-that fails, at u itself, with the Dirichlet values applied in the first Newton step. Iterations:
+the last step's correction); if that fails, at u itself, with the Dirichlet values applied in the first Newton step.
+Iterations:
 
 1. ``newton_state.assemble``: R of (1). The step ends when (6) holds and contact points searched again agree
    (``balanced``, ``confirmed``).
