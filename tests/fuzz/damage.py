@@ -23,6 +23,7 @@ JUNK: tuple[Any, ...] = (
     *(None, 0, 1, -1, 5, -1.5, 2**31, 2**63, 10**30, 1e300, 1e-300, float("nan"), float("inf"), "", "x", "²", True),
     *([], {}, [1, 2, 3], [[]], {"a": 1}, [None], "a/b", "../../x", "~nobody/x", "\0", "$x", "é" * 200, [0] * 1000),
 )
+_MOST = 64 << 20  # bytes of the largest file that is made; damage after damage may repeat a text a billion times
 _NUMBER = re.compile(rb"(?<![\w.])-?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.])")
 
 
@@ -43,7 +44,7 @@ def damaged(data: bytes, draw: random.Random) -> bytes:
         ways += [_lines, _lines, _words, _words, _words]
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
         if data:
-            data = draw.choice(ways)(data, draw)
+            data = draw.choice(ways)(data, draw)[:_MOST]
     return data
 
 
@@ -113,7 +114,7 @@ def changed(content: Any, draw: random.Random) -> Any:
     elif what < 0.45 and isinstance(container, list):
         container.extend([container[key]] * draw.choice((1, 3, 1000)))
     elif what < 0.6 and isinstance(container[key], int | float):
-        value = container[key]
+        value = container[key] if abs(container[key]) < 1e300 else 1
         container[key] = draw.choice((-value, value + 1, value * 2, value * 10**9, value - 1, value / 3, str(value)))
     else:
         container[key] = draw.choice(JUNK)

@@ -128,6 +128,12 @@ def test_damaged_files_are_refused_or_read_whole(tmp_path_factory, form: str, cu
         (b"vertex_indices", b"vertex_numbers", "has no triangles"),
         (b"format", b"farmat", r"a\.ply:2: header line not understood"),
         (b"ply\n", b"plz\n", "is no PLY file"),
+        pytest.param(
+            b"ply\n",
+            b"ply\ncomment " + (1 << 20) * b"a" + b"\n",
+            "want a header .* of at most 1 MiB",
+            id="header too long",
+        ),
     ],
 )
 @pytest.mark.parametrize("form", FORMATS)

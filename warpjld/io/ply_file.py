@@ -32,6 +32,7 @@ _CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4"
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _TEXTURES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _INDICES = ("vertex_indices", "vertex_index")
+_HEADER = 1 << 20  # bytes of the longest header; its lines take several times as much memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +94,11 @@ def read_ply(path: str | Path) -> PlyFile:
 
 def _header(raw: bytes, path: Path) -> tuple[str, list[_Element], int]:
     """Byte order ("" for text), elements, and offset of the body."""
-    end = raw.find(b"end_header")
+    end = raw.find(b"end_header", 0, _HEADER)
     if not raw.startswith(b"ply") or end < 0:
-        raise InputError("is no PLY file: want a header from 'ply' to 'end_header'", path=path)
+        raise InputError(
+            f"is no PLY file: want a header from 'ply' to 'end_header' of at most {_HEADER >> 20} MiB", path=path
+        )
     start = end + len(b"end_header")
     start += 2 if raw[start : start + 2] == b"\r\n" else 1
     order, elements = None, []
