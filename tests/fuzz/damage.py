@@ -23,8 +23,9 @@ JUNK: tuple[Any, ...] = (
     *(None, 0, 1, -1, 5, -1.5, 2**31, 2**63, 10**30, 1e300, 1e-300, float("nan"), float("inf"), "", "x", "²", True),
     *([], {}, [1, 2, 3], [[]], {"a": 1}, [None], "a/b", "../../x", "~nobody/x", "\0", "$x", "é" * 200, [0] * 1000),
 )
-_MOST = 8 << 20  # bytes of the largest file that is made: damage after damage may repeat a text a billion times, and limits on
-# time grow with files
+_MOST = 8 << 20
+"""Bytes of the largest file that is made: damage after damage may repeat a text a billion times, and limits on time grow
+with files."""
 _NUMBER = re.compile(rb"(?<![\w.])-?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.])")
 
 
