@@ -24,8 +24,8 @@ JUNK: tuple[Any, ...] = (
     *([], {}, [1, 2, 3], [[]], {"a": 1}, [None], "a/b", "../../x", "~nobody/x", "\0", "$x", "é" * 200, [0] * 1000),
 )
 _MOST = 8 << 20
-"""Bytes of the largest file that is made: damage after damage may repeat a text a billion times, and limits on time grow
-with files."""
+"""Bytes of the largest file that is made: damage after damage may repeat a text a billion times, and limits on time
+grow with files."""
 _NUMBER = re.compile(rb"(?<![\w.])-?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.])")
 
 
