@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpjld.covering.covering import Covering
 from warpjld.covering.dihedral import dihedral_angles, hinges
-from warpjld.covering.intersections import Crossings, crossing_faces, surface_parts
+from warpjld.covering.intersections import crossing_faces, other_pairs, surface_parts
 from warpjld.covering.pose_losses import PoseLosses
 from warpjld.covering.quality import edge_stretch, unique_edges
 from warpjld.covering.tolerances import TOLERANCES, Tolerances
@@ -107,7 +107,7 @@ class Guard:
         self._parts = parts.of_face[is_flesh]
         self._joined = _joined(parts.names, covering.skeleton.names, covering.skeleton.parents)
         crossing = crossing_faces(self._rest, flesh.faces)
-        self._crossing = _keys(crossing, len(flesh.faces))
+        self._crossing = crossing.pairs
         self._plates = len(crossing.faces) > _PLATES * len(flesh.faces)
         self._relative = self._closed.volume / losses.regions
         self._searched = np.cumsum([2 * len(points) for points in losses.moved]) <= _FACES_SEARCHED
@@ -190,7 +190,7 @@ class Guard:
         """Count intersections of the faces at the vertices of a mask, and write them into ``into`` at pose ``f``."""
         faces = np.flatnonzero(any_of(near, self._faces))
         pairs = faces[crossing_faces(points, self._faces[faces]).pairs].reshape(-1, 2)
-        pairs = pairs[~np.isin(pairs[:, 0] * len(self._faces) + pairs[:, 1], self._crossing)]
+        pairs = other_pairs(pairs, self._crossing, len(self._faces))
         a, b = self._parts[pairs].T
         folds = self._joined[a, b]
         folded = np.unique(pairs[folds])
@@ -201,12 +201,6 @@ class Guard:
 def copy_of(measures: PoseMeasures) -> PoseMeasures:
     """A deep copy, whose entries can be overwritten pose by pose."""
     return replace(measures, **{name: value.copy() for name, value in vars(measures).items()})
-
-
-def _keys(crossings: Crossings, faces: int) -> NDArray[np.int64]:
-    """One integer for each pair of intersecting faces, shape (pairs,)."""
-    pairs = crossings.pairs.astype(np.int64)
-    return pairs[:, 0] * faces + pairs[:, 1]
 
 
 def _joined(parts: tuple[str, ...], names: tuple[str, ...], parents: NDArray[np.int32]) -> NDArray[np.bool_]:

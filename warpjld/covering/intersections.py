@@ -19,7 +19,7 @@ from warpjld.skeleton.hand import DIGITS
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
 
-__all__ = ["Crossings", "Parts", "crossing_faces", "surface_parts"]
+__all__ = ["Crossings", "Parts", "crossing_faces", "other_pairs", "surface_parts"]
 
 _CHUNK = 200_000  # pairs tested at a time, which bounds memory
 
@@ -89,6 +89,12 @@ def crossing_faces(
         pairs = pairs[wanted(pairs)]
     kept = [part[_cross(points, faces, part)] for part in np.array_split(pairs, max(len(pairs) // _CHUNK, 1))]
     return Crossings(np.concatenate(kept).astype(np.int32))
+
+
+def other_pairs(pairs: NDArray[np.integer], known: NDArray[np.integer], count: int) -> NDArray[np.int64]:
+    """Those pairs (N, 2) of ``count`` faces that are not among known ones (M, 2), the smaller index first in both."""
+    keys, before = (some.astype(np.int64) @ [count, 1] for some in (pairs, known))
+    return pairs[~np.isin(keys, before)].astype(np.int64)
 
 
 def surface_parts(covering: Covering) -> Parts:

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 __all__ = ["triangle_frames"]
 
-_ROUNDING = 2e-6  # error of a distance in float32 as a part of coordinates and size: a dozen roundings, twice
-
 
 def triangle_frames(corners: NDArray[np.floating]) -> NDArray[np.float32]:
     """Frames of triangles (…, 3, 3), shape (…, 20).
@@ -18,6 +16,8 @@ def triangle_frames(corners: NDArray[np.floating]) -> NDArray[np.float32]:
     and length of BC, those of AC (in the plane, 3 each), and the error of a distance, without the point's share [m]. A
     triangle without area lies along x, in any plane.
     """
+    from warpjld_kernels.triangle_tree import FRAME, FRAME_ROUNDING
+
     at = np.asarray(corners, dtype=np.float64)
     edges = np.roll(at, -1, axis=-2) - at
     longest = (edges**2).sum(axis=-1).argmax(axis=-1)
@@ -30,14 +30,14 @@ def triangle_frames(corners: NDArray[np.floating]) -> NDArray[np.float32]:
     exact = axes.astype(np.float64)
     flat = np.einsum("...ki,...ni->...nk", exact[..., :2, :], np.stack([b - a, c - a], axis=-2))
     over, corner = flat[..., 0, :1] * [1.0, 0.0], flat[..., 1, :]
-    out = np.empty((*at.shape[:-2], 20))
+    out = np.empty((*at.shape[:-2], FRAME))
     out[..., :9] = axes.reshape(*at.shape[:-2], 9)
     out[..., 9:12] = -np.einsum("...ki,...i->...k", exact, a)
     out[..., 12] = over[..., 0]
     for first, way in ((13, corner - over), (16, corner)):
         out[..., first + 2] = np.linalg.norm(way, axis=-1)
         out[..., first : first + 2] = _unit(way, np.broadcast_to([0.0, 1.0], way.shape))
-    out[..., 19] = _ROUNDING * (np.abs(a).sum(axis=-1) + over[..., 0])
+    out[..., 19] = FRAME_ROUNDING * (np.abs(a).sum(axis=-1) + over[..., 0])
     return out.astype(np.float32)
 
 

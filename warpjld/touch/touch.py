@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpjld.covering.intersections import crossing_faces
+from warpjld.covering.intersections import crossing_faces, other_pairs
 from warpjld.errors import InputError
 from warpjld.geometry.segment_distance import segment_distance
 from warpjld.runtime.threads import in_threads, threads_for
@@ -202,15 +202,12 @@ class Touch:
 
     def new_crossings(self, pairs: NDArray[np.integer]) -> NDArray[np.int64]:
         """Those pairs of crossing faces (N, 2) that do not cross at rest."""
-        count = len(self.patches.faces)
-        keys = pairs.astype(np.int64) @ [count, 1]
-        return pairs[~np.isin(keys, self._crossing_at_rest)].astype(np.int64)
+        return other_pairs(pairs, self._crossing_at_rest, len(self.patches.faces))
 
     @cached_property
-    def _crossing_at_rest(self) -> NDArray[np.int64]:
-        """One integer for each pair of faces that cross at rest."""
-        pairs = crossing_faces(self._vertices, self.patches.faces).pairs
-        return np.asarray(pairs.astype(np.int64) @ [len(self.patches.faces), 1])
+    def _crossing_at_rest(self) -> NDArray[np.int32]:
+        """Pairs of faces that cross at rest, shape (R, 2)."""
+        return crossing_faces(self._vertices, self.patches.faces).pairs
 
     def _made(self, count: int) -> list[Bench]:
         """Workspaces for ``count`` threads; Warp's meshes cannot be created in several threads at once."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.mesh.hexmesh import HexMesh, nodal_area_vectors
 
-__all__ = ["element_edge", "face_offsets", "face_triangles", "node_offsets", "outer_surface"]
+__all__ = ["element_edge", "face_offsets", "face_triangles", "facet_edge", "node_offsets", "outer_surface"]
 
 _FINE = 0.4
 """Spacing of the sample points on the visible surface, in element edges."""
@@ -43,7 +43,12 @@ def outer_surface(mesh: HexMesh, faces: str) -> Facets:
 def element_edge(mesh: HexMesh, faces: str) -> float:
     """Median edge length of a face set in the reference configuration [m]."""
     nodes, triangles = face_triangles(mesh, faces)
-    x = mesh.nodes[nodes[triangles]]
+    return facet_edge(mesh.nodes[nodes], triangles)
+
+
+def facet_edge(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> float:
+    """Median length of the first edges of triangles (T, 3) between vertices (V, 3) [m]."""
+    x = vertices[triangles]
     return float(np.median(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))
 
 

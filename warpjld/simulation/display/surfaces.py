@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpjld.grasp import Places
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.bodies.surface_offset import element_edge
+from warpjld.simulation.bodies.surface_offset import element_edge, facet_edge
 from warpjld.simulation.display.pressure_map import PressureMap, pressure_map
 from warpjld.simulation.display.refine import RefinedSurface, refine_surface
 from warpjld.simulation.display.separate import SeparatedSurfaces, VisibleSurface, separate_surfaces
@@ -167,7 +167,7 @@ class DeformedSurfaces:
             hand.name: SkinCrossings(
                 hand.triangles,
                 hand.hand.surface.vertices,
-                max(element_edge(hand.mesh, hand.faces), 2.0 * _facet_edge(hand.surface, hand.triangles)),
+                max(element_edge(hand.mesh, hand.faces), 2.0 * facet_edge(hand.surface, hand.triangles)),
                 hand.embedded & (hand.shape.blend > 0.0),
                 self._smoothers[hand.name],
             )
@@ -197,9 +197,3 @@ class DeformedSurfaces:
         after = int(np.clip(np.searchsorted(times, frame), 1, len(times) - 1))
         part = (frame - times[after - 1]) / (times[after] - times[after - 1])
         return np.asarray((1.0 - part) * values[after - 1] + part * values[after])
-
-
-def _facet_edge(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
-    """Median edge length of triangles [m]."""
-    x = vertices[faces]
-    return float(np.median(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.intersections import crossing_faces
+from warpjld.covering.intersections import crossing_faces, other_pairs
 from warpjld.geometry.edge_distance import edge_distance, edge_graph
 from warpjld.geometry.normals import vertex_normals
 from warpjld.simulation.display.smooth import SurfaceSmoother
@@ -61,10 +61,9 @@ class SkinCrossings:
         return np.flatnonzero(self.moves[self.faces].any(axis=1))
 
     @cached_property
-    def _always(self) -> set[tuple[int, int]]:
-        """Pairs of these that cross at rest."""
-        found = crossing_faces(self.rest, self.faces[self._tested]).pairs
-        return {(one, other) for one, other in found.tolist()}
+    def _always(self) -> NDArray[np.int32]:
+        """Pairs of these that cross at rest, shape (R, 2)."""
+        return crossing_faces(self.rest, self.faces[self._tested]).pairs
 
     @cached_property
     def _graph(self) -> csr_array:
@@ -73,9 +72,7 @@ class SkinCrossings:
     def pairs(self, at: NDArray[np.float64]) -> NDArray[np.int64]:
         """Pairs of faces that cross at positions (V, 3) [m] and do not at rest, shape (P, 2)."""
         found = crossing_faces(at, self.faces[self._tested]).pairs
-        if self._always:
-            found = found[[(one, other) not in self._always for one, other in found.tolist()]]
-        return np.asarray(self._tested[found.reshape(-1, 2)])
+        return np.asarray(self._tested[other_pairs(found, self._always, len(self._tested))])
 
     def folded(self, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which pairs of faces lie within an element's edge of each other at rest, shape (P,)."""
@@ -103,22 +100,23 @@ def uncrossed(
         sound: Positions that folds return to, each tried in turn [m], shape (V, 3).
         most: Largest retreat of a vertex [m]; what crosses beyond it still does.
     """
+    pairs = skin.pairs(at)
     for goal in sound:
-        if not len(skin.pairs(at)):
+        if not len(pairs):
             break
-        at = _drawn_back(skin, at, goal, most)
+        at, pairs = _drawn_back(skin, at, pairs, goal, most)
     return at
 
 
 def _drawn_back(
-    skin: SkinCrossings, at: NDArray[np.float64], sound: NDArray[np.float64], most: float
-) -> NDArray[np.float64]:
-    """Positions [m], shape (V, 3), with the fewest crossings while skin retreats, and folds return to ``sound``."""
-    pairs = skin.pairs(at)
+    skin: SkinCrossings, at: NDArray[np.float64], pairs: NDArray[np.int64], sound: NDArray[np.float64], most: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Positions [m], shape (V, 3), with the fewest crossings while skin with crossing ``pairs`` (P, 2) of faces
+    retreats, and folds return to ``sound``; and the pairs of faces that still cross there."""
     inward = -skin.smoother.of(vertex_normals(at, skin.faces).astype(np.float64))
     inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
     retreat, back = np.zeros(len(at)), np.zeros(len(at))
-    out, best, fewest = at, at, len(pairs)
+    best, fewest = at, pairs
     for _ in range(_ROUNDS):
         folded = skin.folded(pairs)
         pressed, folds = pairs[~folded], pairs[folded]
@@ -131,8 +129,8 @@ def _drawn_back(
         out = at + retreat[:, None] * inward
         out += back[:, None] * (sound - out)
         pairs = skin.pairs(out)
-        if len(pairs) < fewest:
-            best, fewest = out, len(pairs)
+        if len(pairs) < len(fewest):
+            best, fewest = out, pairs
         if not len(pairs):
             break
-    return best
+    return best, fewest
