@@ -110,7 +110,7 @@ def test_rig_argument_names_files_and_built_in_hands(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr("warpjld.hand.kept.kept_hand", lambda side: side)
     monkeypatch.setattr(
-        "warpjld.io.load_rig", lambda path, **options: SimpleNamespace(name=f"rig of {path}", suspicious=())
+        "warpjld.io.kept_rig.kept_rig", lambda path, **options: SimpleNamespace(name=f"rig of {path}", suspicious=())
     )
     assert [getattr(rig := open_rig(text), "name", rig) for text in ("builtin:right", "a/b.glb", "C:/b.glb")] == [
         "right",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+from collections.abc import Iterable
 from pathlib import Path
 
 from warpjld.covering.kept_key import binding_key, binding_sources
@@ -35,10 +36,10 @@ def _file(module: str) -> Path | None:
     return None if spec is None or spec.origin is None else Path(spec.origin)
 
 
-def test_every_module_that_binding_runs_through_counts() -> None:
-    counted = {file.resolve() for _, file in binding_sources()}
+def modules_reached(roots: Iterable[str]) -> dict[str, Path]:
+    """Modules of the packages that these import, directly or not, and their files."""
     reached: dict[str, Path] = {}
-    todo = list(_ROOTS)
+    todo = list(roots)
     while todo:
         module = todo.pop()
         file = _file(module)
@@ -47,6 +48,12 @@ def test_every_module_that_binding_runs_through_counts() -> None:
         reached[module] = file
         # packages' own files only gather names: what they import is imported by name where it is wanted
         todo += [] if file.name == "__init__.py" else _imported(module, file)
+    return reached
+
+
+def test_every_module_that_binding_runs_through_counts() -> None:
+    counted = {file.resolve() for _, file in binding_sources()}
+    reached = modules_reached(_ROOTS)
     assert len(reached) > 40
     missing = {module for module, file in reached.items() if file.resolve() not in counted}
     assert missing <= set(_PACKAGES), f"binding imports {sorted(missing)}, of which kept_key.py knows nothing"

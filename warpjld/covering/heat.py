@@ -180,9 +180,11 @@ def _fixed_random_state() -> Iterator[None]:
 
 
 def _direct(matrix: sp.csc_array, right: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    factors = _factorised(matrix)
-    solution: NDArray[np.float64] = factors.solve(right)
-    return solution
+    try:
+        return DiffusionFactor(matrix).solve(right)
+    except ArithmeticError:  # rows had to be exchanged
+        solution: NDArray[np.float64] = _factorised(matrix).solve(right)
+        return solution
 
 
 def _factorised(matrix: sp.csc_array) -> linalg.SuperLU:

@@ -16,9 +16,9 @@ from warpjld.files.whole_file import whole_file
 __all__ = ["CACHE_VARIABLE", "keep", "kept_folder", "used"]
 
 CACHE_VARIABLE = "WARPJLD_CACHE"
-"""Environment variable with the cache folder of bindings and hands, or ``off``."""
+"""Environment variable with the cache folder of rigs, bindings and hands, or ``off``."""
 
-_MOST = 64  # largest number of files
+_MOST = 128  # largest number of files
 _MOST_BYTES = 2**30  # largest total size
 
 

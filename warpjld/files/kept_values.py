@@ -19,7 +19,7 @@ from warpjld.files.sources import hash_of_sources
 
 __all__ = ["hash_of", "kept_value"]
 
-_FORMAT = "warpjld values 1"
+_FORMAT = "warpjld values 2"
 _Value = TypeVar("_Value")
 
 
@@ -31,7 +31,7 @@ def kept_value(
     Args:
         what: Kind of value, one word, for messages and the file name.
         key: Hash of the inputs of ``make`` (see ``hash_of``); a hash of the source code is added.
-        classes: Dataclasses it consists of, besides arrays, tuples, dictionaries, numbers and strings.
+        classes: Dataclasses it consists of, besides arrays, tuples, dictionaries, slices, bytes, numbers and strings.
         make: Function that computes the value.
         modules: Glob patterns of the package's modules that ``make`` depends on; all kernels are included.
     """
@@ -76,6 +76,11 @@ def _plain(value: Any, arrays: list[NDArray[Any]]) -> Any:
         return ["tuple", [_plain(one, arrays) for one in value]]
     if isinstance(value, dict):
         return ["dict", [[name, _plain(one, arrays)] for name, one in value.items()]]
+    if isinstance(value, slice):
+        return ["slice", [_plain(one, arrays) for one in (value.start, value.stop, value.step)]]
+    if isinstance(value, bytes):
+        arrays.append(np.frombuffer(value, dtype=np.uint8))
+        return ["bytes", len(arrays) - 1]
     if isinstance(value, np.generic):
         value = value.item()
     if value is None or isinstance(value, (bool, int, float, str)):
@@ -89,6 +94,10 @@ def _value(plain: Any, arrays: list[NDArray[Any]], classes: dict[str, type]) -> 
     kind, *rest = plain
     if kind == "array":
         return arrays[rest[0]]
+    if kind == "bytes":
+        return arrays[rest[0]].tobytes()
+    if kind == "slice":
+        return slice(*rest[0])
     if kind == "class":
         return classes[rest[0]](**{name: _value(one, arrays, classes) for name, one in rest[1].items()})
     if kind == "tuple":

@@ -28,6 +28,7 @@ _ALLOWED = 0.5  # depth that a digit may overlap, relative to what skin can yiel
 _BESIDE = 0.4  # factor of overlaps between two digits: side by side they overlap regardless of their flexion
 _SCAN = 10  # steps of the scan that opens a digit until it is free
 _STEPS = 7  # bisections of the last scan step: 1/1280 of a digit's bend; depths are interpolated from there
+_ROUNDS = 2  # times that digits are opened against all parts: once, and again where some could not get free
 _FASTEST = 2.0  # largest rate of a digit's change of share, relative to the motion of the digits
 _BLOCK = 32  # frames searched at once
 _STILL = 1e-6  # rotation from rest [rad] below which a digit cannot be opened
@@ -40,7 +41,8 @@ def close_until_touch(covering: Covering, poses: Poses, touch: Touch, *, first: 
     deepest overlap is half of what skin can yield, and no face of it crosses another after separation. Digits are
     processed in turn, from index to pinky and the thumb last, each against the palm, the body and the limited digits
     before it, so that each share is the root of a scalar equation, which varies continuously with the motion. A digit
-    that touches nothing keeps its pose exactly; one that crosses something however far it opens is not opened for that.
+    that touches nothing keeps its pose exactly; one that crosses something however far it opens is opened to where
+    fewest faces cross, if that halves them, and the others are then opened against it.
 
     Args:
         covering: The hand or body.
@@ -133,22 +135,24 @@ def _block(covering: Covering, poses: Poses, touch: Touch, digits: list[_Digit])
             share[n] *= left
             poses = _bent(covering, poses, digit.joints, left)
             found = touch.measured(covering.deform(poses), poses)
-    # a second time against all parts: skin separated from a later digit may cross an earlier one
-    for against in (digits, [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]):
+    # again against all parts: skin separated from a later digit may cross an earlier one, and a digit that could not
+    # get free may have been in the way of others
+    everything = [replace(digit, counts=np.ones_like(digit.counts)) for digit in digits]
+    for against in (digits, *[everything] * _ROUNDS):
         crossing = _crossing(covering, touch, poses, against)
         for n, digit in enumerate(against):
             if not crossing[n].any():
                 continue
 
             def crosses(tried: Poses, digit: _Digit = digit) -> NDArray[np.float64]:
-                return np.where(_crossing(covering, touch, tried, [digit])[0], 1.0, -1.0)
+                return _crossing(covering, touch, tried, [digit])[0] - 0.5
 
-            left = _search(covering, poses, digit, np.where(crossing[n], 1.0, -1.0), crosses, interpolated=False)
+            left = _search(covering, poses, digit, crossing[n] - 0.5, crosses, interpolated=False)
             if (left < 1.0).any():
                 share[n] *= left
                 poses = _bent(covering, poses, digit.joints, left)
                 crossing = _crossing(covering, touch, poses, against)
-    return [(kept, stuck, *of) for kept, stuck, of in zip(share, crossing, depth, strict=True)]
+    return [(kept, stuck > 0, *of) for kept, stuck, of in zip(share, crossing, depth, strict=True)]
 
 
 def _motion(covering: Covering, poses: Poses, digits: list[_Digit]) -> NDArray[np.float64]:
@@ -191,7 +195,8 @@ def _search(
     interpolated: bool,
 ) -> NDArray[np.float64]:
     """Largest share of a digit's rotation from rest for which a measure is not positive, shape (F,); 1 where it is not
-    positive in the original pose, or positive however far the digit opens.
+    positive in the original pose. Where it is positive however far the digit opens: the scanned share at which a
+    measure that is not interpolated is least, if that is less than half, else 1.
 
     Args:
         covering: The hand or body.
@@ -199,7 +204,8 @@ def _search(
         digit: The digit that is opened.
         over: The measure in the original poses, shape (F,).
         measure: The measure of n poses, shape (n,).
-        interpolated: Whether the measure is continuous: then its zero in the last interval is interpolated.
+        interpolated: Whether the measure is continuous: then its zero in the last interval is interpolated. Otherwise
+            it is a number of faces less a half.
     """
     out = np.ones(len(poses))
     frames = np.flatnonzero((over > 0.0) & (_bend(covering, poses, digit.joints) > _STILL))
@@ -207,6 +213,7 @@ def _search(
         return out
     # scan from closed to open, since the measure may change its sign more than once
     low, high, at_low, at_high = np.ones(len(frames)), np.ones(len(frames)), over[frames], over[frames]
+    best, fewest = np.ones(len(frames)), 0.5 * over[frames]
     for share in np.linspace(1.0, 0.0, _SCAN + 1)[1:]:
         rows = np.flatnonzero(at_low > 0.0)
         if not len(rows):
@@ -214,7 +221,11 @@ def _search(
         high[rows], at_high[rows] = low[rows], at_low[rows]
         low[rows] = share
         at_low[rows] = measure(_bent(covering, _picked(poses, frames[rows]), digit.joints, low[rows]))
+        fewer = at_low < fewest
+        best, fewest = np.where(fewer, low, best), np.where(fewer, at_low, fewest)
     opens = at_low <= 0.0
+    if not interpolated:
+        out[frames[~opens]] = best[~opens]
     frames = frames[opens]
     low, high, at_low, at_high = low[opens], high[opens], at_low[opens], at_high[opens]
     picked = _picked(poses, frames)
@@ -257,18 +268,19 @@ def _depths(
     return ratio, depth, other
 
 
-def _crossing(covering: Covering, touch: Touch, poses: Poses, digits: list[_Digit]) -> NDArray[np.bool_]:
-    """Whether a face of a digit crosses one of the parts it is closed against after separation, shape (digits, F)."""
+def _crossing(covering: Covering, touch: Touch, poses: Poses, digits: list[_Digit]) -> NDArray[np.int64]:
+    """Number of pairs of crossing faces, one of the digit, the other of a part it is closed against, after separation,
+    shape (digits, F)."""
     part = touch.patches.part[touch.patches.faces]
     parted, _ = touch.parted(covering.deform(poses), poses)
     own = np.array([digit.parts[part].any(axis=1) for digit in digits])
     counts = np.array([digit.counts[part].all(axis=1) for digit in digits])
-    out = np.zeros((len(digits), len(poses)), dtype=bool)
+    out = np.zeros((len(digits), len(poses)), dtype=np.int64)
     for f, points in enumerate(parted):
         near = np.flatnonzero(_beside(points[touch.patches.faces], own))
         pairs = touch.new_crossings(near[crossing_faces(points, touch.patches.faces[near]).pairs])
         found = np.logical_and(own[:, pairs].any(axis=2), counts[:, pairs].all(axis=2))
-        out[:, f] = np.asarray(found).any(axis=1)
+        out[:, f] = np.asarray(found).sum(axis=1)
     return out
 
 

@@ -232,6 +232,6 @@ def _unit(arguments: Arguments) -> str | float:
 
 
 def _load(path: object, **options: object) -> Rig:
-    from warpjld.io import load_rig
+    from warpjld.io.kept_rig import kept_rig
 
-    return load_rig(path, **options)  # type: ignore[arg-type]
+    return kept_rig(path, **options)  # type: ignore[arg-type]

@@ -63,9 +63,9 @@ class HandChoice:
             from warpjld.hand.kept import kept_hand
 
             return kept_hand(self.side or "right", length=self.length, breadth=self.breadth, resolution=self.resolution)
-        from warpjld.io import load_rig
+        from warpjld.io.kept_rig import kept_rig
 
-        return load_rig(
+        return kept_rig(
             self.file,
             skeleton=self.skeleton,
             side=self.side,
