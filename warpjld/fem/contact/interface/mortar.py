@@ -115,7 +115,7 @@ class Mortar:
             x: Positions of the body's nodes [m], shape (N, 3).
             reach: Search distance [m].
             normals: Normals of the slave's nodes, shape (m, 3).
-            facing: Whether points have instead the mean normals of those parts of their faces that face the other side
+            facing: Whether points have instead the normals of those parts of both sides' faces that face each other
                 (``facing_normals``).
         """
         slave, master = self.slave, self.master
