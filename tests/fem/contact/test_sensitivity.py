@@ -151,7 +151,7 @@ BALL, PLATE, BLOCKS = Dented(False), Dented(True), Stacked()
         (PLATE, Case(friction=0.15), 5, 18, (aside, down, stiffer, rougher)),
         (BLOCKS, Case(), 0, 0, (down,)),
         (BLOCKS, Case(friction=2.0), 16, 0, (aside, stiffer)),
-        (BLOCKS, Case(friction=0.15), 12, 4, (aside, down, stiffer, rougher)),
+        (BLOCKS, Case(friction=0.15), 5, 11, (aside, down, stiffer, rougher)),
     ],
     ids=["ball", "ball stuck", "plate sliding", "blocks", "blocks stuck", "blocks sliding"],
 )

@@ -10,6 +10,7 @@ from scipy.sparse import coo_array, csr_array
 
 from warpjld.errors import InputError
 from warpjld.fem.arrays import Array, Ints, Ints32, Mask
+from warpjld.fem.contact.interface.common_normals import FacingParts
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.pair_filter import counted_share
 from warpjld.fem.contact.interface.pairs import Pair
@@ -114,7 +115,7 @@ class Mortar:
             x: Positions of the body's nodes [m], shape (N, 3).
             reach: Search distance [m].
             normals: Normals of the slave's nodes, shape (m, 3).
-            facing: Whether points have instead the mean normals of those parts of their faces that face the other side
+            facing: Whether points have instead the normals of those parts of both sides' faces that face each other
                 (``facing_normals``).
         """
         slave, master = self.slave, self.master
@@ -143,7 +144,7 @@ class Mortar:
         return ContactPoints(nodes, table, normal, area[nodes], gap, np.zeros((len(nodes), 3)), pairs, share)
 
     def facing_normals(self, x: Array, pairs: Ints32, integrals: Array) -> Array:
-        """Mean normals n = v / |v|, v = Σ ∫ N_a dA n_f over the parts of each node's faces that face the other side.
+        """Normals of slave nodes, of those parts of the faces of both sides that face each other (``FacingParts``).
 
         At a ridge of the slave of which one side touches, the mean over all faces (as at other nodes) would point past
         the other side: the gap along it would shrink by the cosine, but not the offset of the visible surface; pressure
@@ -159,10 +160,8 @@ class Mortar:
         """
         slave = self.slave
         share = integrals[:, :16].reshape(-1, 4, 4).sum(axis=2)
-        each = share[:, :, None] * unit(slave.area_vectors(x)[pairs[:, 0]])[:, None]
-        where = slave.corners[pairs[:, 0]].ravel()
-        columns = each.reshape(-1, 3).T
-        return unit(np.stack([np.bincount(where, column, len(slave.nodes)) for column in columns], axis=1))
+        sides = [unit(side.area_vectors(x)[pairs[:, k]]) for k, side in enumerate((slave, self.master))]
+        return FacingParts.of(slave.corners[pairs[:, 0]], len(slave.nodes), share, sides[0], sides[1]).normals
 
     def met_by(self, label: int) -> Mask:
         """Mask of the master facets that slave facets of a label may touch, shape (G,)."""

@@ -1,10 +1,10 @@
 """Contact solver: augmented Lagrangian method with Newton's method on bodies and contact together, in load steps.
 
 Notation: u displacement, x = X + u; of contact point a: area A, weights W (mortar weights, or a single node against an
-obstacle), unit normal n towards the other side (between meshes: the mean over those parts of the node's faces that face
-it, ``Mortar.facing_normals``), gap g = −n·(W x), slip s = (I − n nᵀ) W (u − u₀) since the start of the
-load step (minus the obstacle's own motion), multipliers λ_n ≥ 0 and λ_t, penalty ε, friction coefficient μ. Equation
-numbers are those of this file.
+obstacle), unit normal n towards the other side (between meshes: the mean over those parts of both sides' faces around
+the node that face each other, the flatter side's weighted more, ``FacingParts``), gap g = −n·(W x), slip
+s = (I − n nᵀ) W (u − u₀) since the start of the load step (minus the obstacle's own motion), multipliers λ_n ≥ 0 and
+λ_t, penalty ε, friction coefficient μ. Equation numbers are those of this file.
 
     (1)  R(u, λ) = f_ext(u) − f_int(u) + Σ_a A Wᵀ (q − p n) = 0             equilibrium at free degrees of freedom
     (2)  p = max(0, λ_n − ε g)                                              pressure (Alart & Curnier 1991)
@@ -39,7 +39,8 @@ Iterations:
    points with λ_n > 0 are active in (2) whatever their gap, and the solve decides whether they open (primal–dual active
    set strategy: Hüeber & Wohlmuth 2005). λ_n of the previous solve bounds friction in (3), so that each solve is a
    convex problem (Tresca friction). Friction acts on a point from its second iteration with pressure on; if it has slid
-   far without friction until then, and no body is held by friction alone, it begins by sliding, else by sticking.
+   far without friction until then, and no body is held by friction alone, it begins by sliding, else by sticking. If
+   contact alone holds a body that slid everywhere, all its points begin by sticking (``stuck_again``).
 5. *Alternating phase*, afterwards: λ is updated only if the active set did not change; otherwise a line search along Δu
    (by work, or by the residual if E is present) settles the active set.
    In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points

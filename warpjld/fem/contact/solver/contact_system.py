@@ -13,6 +13,7 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.fem.contact.law.multipliers import elastic_multipliers, update_multipliers
 from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping
+from warpjld.fem.contact.solver.first_states import stuck_again
 from warpjld.fem.contact.solver.tangent import friction_coupling, linearise_mortar
 from warpjld.fem.load.inertia import Inertia
 from warpjld.fem.load.loads import Loads
@@ -262,7 +263,9 @@ class ContactSystem:
         """States with ``open_before`` set for the start of a step, on interfaces with friction.
 
         With inertia no site slides freely before contact begins: friction acts on the velocity at the end of the step.
+        Where contact alone holds a body, ``stuck_again`` gives the states.
         """
+        states = states if step.held else stuck_again(self.interfaces, states)
         x = self._rest + start.reshape(-1, 3)
         out = []
         for interface, s in zip(self.interfaces, states, strict=True):

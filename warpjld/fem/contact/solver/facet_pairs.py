@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from warpjld.fem.arrays import Array, Ints, cross_matrix
+from warpjld.fem.contact.interface.common_normals import FacingParts
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.mortar import Mortar
 
@@ -80,30 +81,33 @@ class FacetPairs:
     def normals(self) -> Any:
         """Derivatives of the points' normals (``Mortar.facing_normals``), ``csr_array`` (3m, 3N)."""
         points, corner = self._points, self.corner
-        count = len(points.sites)
-        normal, turned = self._facet_normals()
-        change = self.own.sum(axis=3)[:, :, :, None] * normal[:, None, None]
-        change[:, :12] += self._area[:, None, :, None] * turned[:, :, None]
-        total = np.zeros((count, 3))
-        known = corner >= 0
-        np.add.at(total, corner[known], (self._area[:, :, None] * normal[:, None])[known])
-        n = points.normal[corner][:, None]
-        change -= n * np.einsum("pkai,pkai->pka", n + np.zeros_like(change), change)[..., None]
-        length = np.linalg.norm(total, axis=1)[corner]
-        change /= np.where(length > 0.0, length, 1.0)[:, None, :, None]
+        count, known = len(points.sites), corner >= 0
+        wider = self.own.sum(axis=3)
+        sides, changes = [], []
+        for k in (0, 1):
+            normal, turned = _facet_normals(self._at[:, 4 * k : 4 * k + 4])
+            change = wider[:, :, :, None] * normal[:, None, None]
+            change[:, 12 * k : 12 * k + 12] += self._area[:, None, :, None] * turned[:, :, None]
+            sides.append(normal)
+            changes.append(change.transpose(0, 2, 1, 3))
+        share = np.where(known, self._area, 0.0)
+        parts = FacingParts.of(np.maximum(corner, 0), count, share, sides[0], sides[1])
+        change = parts.turned(corner, changes[0], changes[1], wider.transpose(0, 2, 1)).transpose(0, 2, 1, 3)
         used = np.broadcast_to(known[:, None, :, None], change.shape)
         row = np.broadcast_to((3 * corner[:, :, None] + np.arange(3))[:, None], change.shape)
         column = np.broadcast_to(self.column[:, :, None, None], change.shape)
         shape = (3 * count, self._size)
         return csr_array(coo_array((change[used], (row[used], column[used])), shape=shape))
 
-    def _facet_normals(self) -> tuple[Array, Array]:
-        """Unit normals of the slave facets (P, 3), and their derivatives by the corners' coordinates (P, 12, 3)."""
-        a, b, c, d = (self._at[:, k] for k in range(4))
-        vector = 0.5 * np.cross(c - a, d - b)
-        size = np.linalg.norm(vector, axis=1)
-        normal = vector / size[:, None]
-        along, across = cross_matrix(c - a), cross_matrix(d - b)
-        each = 0.5 * np.stack([across, -along, -across, along], axis=1)  # pair, corner, 3, 3
-        plane = (np.eye(3) - normal[:, :, None] * normal[:, None, :]) / size[:, None, None]
-        return normal, np.einsum("pij,pcjk->pcki", plane, each).reshape(-1, 12, 3)
+
+def _facet_normals(at: Array) -> tuple[Array, Array]:
+    """Unit normals of facets with corners (P, 4, 3), shape (P, 3), and their derivatives by the corners' coordinates
+    (P, 12, 3)."""
+    a, b, c, d = (at[:, k] for k in range(4))
+    vector = 0.5 * np.cross(c - a, d - b)
+    size = np.linalg.norm(vector, axis=1)
+    normal = vector / size[:, None]
+    along, across = cross_matrix(c - a), cross_matrix(d - b)
+    each = 0.5 * np.stack([across, -along, -across, along], axis=1)  # pair, corner, 3, 3
+    plane = (np.eye(3) - normal[:, :, None] * normal[:, None, :]) / size[:, None, None]
+    return normal, np.einsum("pij,pcjk->pcki", plane, each).reshape(-1, 12, 3)
