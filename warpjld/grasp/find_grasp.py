@@ -129,7 +129,8 @@ def find_grasp(
         seed: Seed of the random numbers.
 
     Raises:
-        InputError: No hand, no such posture, digits that cannot oppose each other, an object that is nowhere narrow enough, or no placement led to a grasp.
+        InputError: No hand, no such posture, digits that cannot oppose each other, an object that is nowhere narrow
+        enough, or no placement led to a grasp.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)

@@ -237,8 +237,9 @@ class _Run:
         travel = RIDING if any(one.release is not None for one in self.grips) else TRAVEL
         for hand in (one for one in model.hands if any(one.name == grip.actor for grip in closing)):
             count = max(count, hand.bones.steps([(hand.bones.angles(at), at) for at in ends], travel))
-        longest = min((one.release.step for one in self.grips if one.release is not None), default=math.inf)
-        count = max(count, math.ceil((steps[-1] - since) / longest - 1e-9))
+        for release in (one.release for one in self.grips if one.release is not None):
+            if release.over < steps[-1] and since < release.free:
+                count = max(count, math.ceil((steps[-1] - since) / release.step - 1e-9))
         return [since + (steps[-1] - since) * (k + 1) / count for k in range(count - 1)] + [steps[-1]]
 
     def save(self, checkpoint: CheckpointFile) -> bool:

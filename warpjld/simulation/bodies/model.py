@@ -126,8 +126,8 @@ class ContactModel:
         return out
 
     def after(self, nodal: NDArray[np.float64]) -> History:
-        """History after an equilibrium with contact forces of each pair [N], shape (P, N, 3): which hand holds each free
-        object."""
+        """History after an equilibrium with contact forces of each pair [N], shape (P, N, 3): which hand holds each
+        free object."""
         hands = {hand.name for hand in self.hands}
         carried: dict[str, str] = {}
         for one in self.objects:

@@ -1,8 +1,8 @@
 """Support of an object until a hand has taken its weight (R123, R128).
 
-Support points hold the object until the hand begins to close on it. From then on it is free to ride along: its weight is
-borne, and a viscous medium around it resists motion, which leaves no force once nothing moves. When the hand has closed,
-the weight is handed over; at the end the medium goes, and the hand alone holds the object.
+Support points hold the object until the hand begins to close on it. From then on it is free to ride along: its weight
+is borne, and a viscous medium around it resists motion, which leaves no force once nothing moves. When the hand has
+closed, the weight is handed over; at the end the medium goes, and the hand alone holds the object.
 """
 
 from __future__ import annotations

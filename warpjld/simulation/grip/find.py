@@ -120,8 +120,8 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: C
     grip, lowered = (0.0, None) if taken is None else (found.grip, taken[0])
     release = None
     if taken is not None:
-        times = (frame - model.start for frame in (request.first, request.middle, request.last))
-        release = SupportRelease(request.object, *times, trials.ride.least)
+        first, middle, last = (frame - model.start for frame in (request.first, request.middle, request.last))
+        release = SupportRelease(request.object, first, middle, last, trials.ride.least)
     status, force, digits = found.status.name, found.trial.force, digits_that_press(effort)
     return FoundGrip(request, status, text, grip, lowered, force, digits, tuple(rows), release=release)
 

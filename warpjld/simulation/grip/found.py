@@ -22,9 +22,10 @@ __all__ = ["FoundGrip", "SupportRelease", "digits_that_press", "trial_row", "wri
 _PRESSES = 0.01
 """Force relative to that of the strongest digit above which a digit counts as pressing: flesh between two digits
 transmits a little to both."""
-_STEPS = 8
-"""Load steps in which the weight is handed over and the object comes to rest: the drag is that of the search, in which
-what was left to balance halved in each step."""
+_STEPS, _SOFTER = 5, 0.5
+"""Load steps in which the weight is handed over and the object comes to rest, and their drag over that which would let
+the weight alone move it by a twentieth of its height in a step: in searches, what was left to balance then became a
+third in a step."""
 _COLUMNS = (
     *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
     *("chosen", "status"),
@@ -41,7 +42,7 @@ class SupportRelease:
         begins: Time from which on it rides along with the closing hand [frames from the model's start].
         over: Time from which on its weight is handed over.
         free: Time from which on the hand alone holds it.
-        drag: Stiffness that resists its motion in a load step [N/m].
+        drag: Drag with which its weight alone would move it by a twentieth of its height in a load step [N/m].
     """
 
     object: str
@@ -52,14 +53,16 @@ class SupportRelease:
 
     @property
     def step(self) -> float:
-        """Longest load step while it rides along [frames]."""
+        """Longest load step while its weight is handed over [frames]."""
         return (self.free - self.over) / _STEPS
 
     def applied(self, one: ObjectBody) -> ObjectBody:
         """The object with its support released, if it is the named one; others unchanged."""
         if one.name != self.object or one.support is None:
             return one
-        return replace(one, support=one.support.released(self.begins, self.over, self.free, self.drag * self.step))
+        return replace(
+            one, support=one.support.released(self.begins, self.over, self.free, _SOFTER * self.drag * self.step)
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """Trial whether a simulated hand holds an object's weight at a grip, by letting the object ride along (R122–R124).
 
 While the digits close, the object's weight is borne and it is free to move with them through a viscous medium
-(``warpjld.simulation.grip.ride``). Then its weight comes on, and it moves on until it rests, or evidently will not: it is
-held if it rests, and an equilibrium without the medium is found there.
+(``warpjld.simulation.grip.ride``). Then its weight comes on, and it moves on until it rests, or evidently will not: it
+is held if it rests, and an equilibrium without the medium is found there.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from warpjld.simulation.grip.squeeze import TRAVEL, Squeeze
 __all__ = ["RIDING", "HandTrials"]
 
 RIDING = 3.0 * TRAVEL
-"""Largest motion of a joint in one step of closing [m]: an object that gives way meets no more than a third of the force
-of one that is held."""
+"""Largest motion of a joint in one step of closing [m]: an object that gives way meets no more than a third of the
+force of one that is held."""
 _CUTS = 3
 """Most halvings of a step of closing."""
 _SETTLED, _SETTLES = 0.2, 12
-"""Share of the weight still to be balanced at which a closed hand is taken to be in balance, and most steps until then."""
-_RESTS, _STEPS = 0.01, 40
+"""Share of the weight still to be balanced at which a closed hand is taken to be in balance, and most steps until
+then."""
+_RESTS, _STEPS = 0.02, 40
 """Share of the weight still to be balanced at which the object counts as at rest under its weight, and most steps until
 then."""
 _FINER = 0.1
@@ -61,6 +62,8 @@ class HandTrials(WeightTrials):
         InputError: An object without weight, or gravity not along one axis.
     """
 
+    hopeless, lasting = 0.85, True
+
     def __init__(self, squeeze: Squeeze, one: ObjectBody) -> None:
         model = squeeze.model
         self.squeeze, self._one = squeeze, one
@@ -80,7 +83,7 @@ class HandTrials(WeightTrials):
         at = max(known for known in self._known if known < grip)
         here, instants = self._known[at], list[ContactInstant]()
         whole = (grip - at) / self.squeeze.steps(at, grip, RIDING)
-        part = whole
+        part, left = whole, 0.0
         while at < grip:
             ahead = grip if at + 1.001 * part >= grip else at + part
             self.ride.begin()
@@ -94,7 +97,8 @@ class HandTrials(WeightTrials):
                 continue
             at, here = ahead, done.solution
             instants += here.instants
-        if self.weight.most(here.last) >= self.hopeless:
+            left = done.left
+        if self.weight.most(here.last) >= self.hopeless and left > _SETTLED * self.weight.weight:
             here = self._balanced(grip, here, instants)
         self._known[grip] = replace(here, instants=(*instants,) or here.instants)
         return self._known[grip]
@@ -135,22 +139,25 @@ class HandTrials(WeightTrials):
                 if rests < _RESTS:
                     return Loaded(TrialOutcome.UNSOLVED, here, tuple(instants), 1.0 - least)
                 rests *= _FINER
-            on = on + 1 if self._goes_on(done, before) else 0
+            more = self._goes_on(done, before)
+            on = on + more if more else 0
             outcome_now = self._outcome(here, begin, on)
             if outcome_now is not None:
                 return Loaded(outcome_now, here, tuple(instants), 1.0 - least)
             before = done
         return Loaded(TrialOutcome.UNSOLVED, here, tuple(instants), 1.0 - least)
 
-    def _goes_on(self, now: RideStep, before: RideStep | None) -> bool:
-        """Whether the object would still have to go far until it rests, as its drag hardly becomes less.
+    def _goes_on(self, now: RideStep, before: RideStep | None) -> int:
+        """1 if the object would still have to go far until it rests, as its drag hardly becomes less; 2 if that grows.
 
         The stiffness c with which the digits hold it back reduces what is left to D / (D + c) of it in a step.
         """
         if before is None or now.left < _RESTS * self.weight.weight:
-            return False
+            return 0
         held_back = now.drag * (before.left / now.left - 1.0)
-        return held_back * _FAR * self.weight.tall < now.left
+        if held_back * _FAR * self.weight.tall >= now.left:
+            return 0
+        return 1 if held_back > 0.0 else 2
 
     def _outcome(self, here: ContactSolution, begin: ContactSolution, on: int) -> TrialOutcome | None:
         """Outcome if the hand evidently does not hold the object; None to continue."""
@@ -165,6 +172,11 @@ class HandTrials(WeightTrials):
         if on >= _ON:
             return TrialOutcome.SLIDES if slides else TrialOutcome.GIVES
         return TrialOutcome.SANK if self.ride.way(here, begin) > _FAR * weight.tall else None
+
+    def capacity(self, grip: float, instant: ContactInstant) -> float:
+        """Share of the weight that friction could bear with the pressures before the weight acts; under it, an object
+        that rode along is pressed as hard within a tenth, unless it slips."""
+        return self.weight.most(self.closed(grip).last)
 
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
         """Largest load share of the hand's muscles, and its digit."""

@@ -42,9 +42,10 @@ class WeightTrials(ABC):
         hopeless: Share of the weight that friction must be able to bear with the pressures before the support is
             removed. Not 1: under the weight an object drags the pads along and presses them harder, by a fifth on
             fingertips.
+        lasting: Whether capacities are comparable whether the weight has come on or not.
     """
 
-    hopeless = 0.6
+    hopeless, lasting = 0.6, False
 
     def __init__(self, weight: SharedWeight, budget: SearchBudget) -> None:
         self.weight, self.budget = weight, budget
@@ -88,6 +89,10 @@ class WeightTrials(ABC):
         weight acts; None if not known."""
         return None
 
+    def capacity(self, grip: float, instant: ContactInstant) -> float:
+        """Share of the weight that friction could bear with the pressures of a grip, at the last state of its trial."""
+        return self.weight.most(instant)
+
     def beneath(self, instant: ContactInstant) -> str:
         """Message about what else bears the object; empty if nothing does."""
         return ""
@@ -108,9 +113,9 @@ class WeightTrials(ABC):
         share, who = self.strain(grip, instant)
         note = self.beneath(instant) if outcome is TrialOutcome.STANDS else ""
         known = outcome is not TrialOutcome.UNSOLVED
-        capacity = self.weight.most(instant) if known else float("nan")
+        capacity = self.capacity(grip, instant) if known else float("nan")
         rate = self.rate(grip) if capacity > 0.0 else None
         slope = None if rate is None else capacity * rate
-        loaded, closed = grip in self._after, self.closed(grip)
+        loaded, closed = self.lasting or grip in self._after, self.closed(grip)
         pressed = self.weight.force(closed.last) if closed.converged else float("nan")
         return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope, loaded, pressed)

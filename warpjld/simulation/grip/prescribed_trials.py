@@ -1,7 +1,7 @@
 """Trial grips of arbitrary bodies whose Dirichlet conditions close on an object, without a hand (R122–R124).
 
-The object does not move while they close, as no weight acts. Then its weight comes on while the height of a central node
-(the handle) is prescribed, which bears what the bodies do not, and the handle is lowered
+The object does not move while they close, as no weight acts. Then its weight comes on while the height of a central
+node (the handle) is prescribed, which bears what the bodies do not, and the handle is lowered
 (``warpjld.simulation.grip.lower``).
 """
 
@@ -82,9 +82,7 @@ class PrescribedTrials(WeightTrials):
         self._closed: dict[float, ContactSolution] = {}
         own = np.unique(mesh.elements[mesh.regions == mesh.region_names.index(name)])
         touching = [*pairs, *others]
-        super().__init__(
-            SharedWeight(body, own, touching, range(len(pairs)), gravity), budget or SearchBudget()
-        )
+        super().__init__(SharedWeight(body, own, touching, range(len(pairs)), gravity), budget or SearchBudget())
         self.body, self.pairs = body, touching
         self.lowered: dict[float, Lowering] = {}
 

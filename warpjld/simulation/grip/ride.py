@@ -1,15 +1,16 @@
 """Motion of an object that rides along with a closing hand: a viscous medium resists it, and nothing holds it (R123).
 
-An object that is held at its place while digits close is held by more than its weight: digits seldom meet it at the same
-time with the same force. Once let go, it has to move by millimetres to where the digits balance, which Newton's method
-does not follow. Here it is never held. A step solves
+An object that is held at its place while digits close is held by more than its weight: digits seldom meet it at the
+same time with the same force. Once let go, it has to move by millimetres to where the digits balance, which Newton's
+method does not follow. Here it is never held. A step solves
 
     f(u) − D (u − u₀) = 0                                                                                  (1)
 
-with the sum f of all forces, the displacement u₀ at the start of the step, and a drag D on the object's nodes in proportion
-to their masses: a backward Euler step of the overdamped motion D u̇ = f (pseudo-transient continuation: Kelley and Keyes
-1998, SIAM J. Numer. Anal. 35, 508–523). Once nothing moves no drag is left, so that what comes to rest is an equilibrium.
-D becomes less as steps converge in few iterations, and more where they fail.
+with the sum f of all forces, the displacement u₀ at the start of the step, and a drag D on the object's nodes in
+proportion to their masses: a backward Euler step of the overdamped motion D u̇ = f (pseudo-transient continuation:
+Kelley and Keyes 1998, SIAM J. Numer. Anal. 35, 508–523). Once nothing moves no drag is left, so that what comes to
+rest is an equilibrium. D becomes less in proportion to what is left to balance (switched evolution relaxation), and
+more where steps fail.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ __all__ = ["Ride", "RideStep"]
 
 _NOTHING = Prescribed(np.empty(0, np.int64), np.empty(0))
 """No Dirichlet conditions."""
-_SLOWEST, _BEGINS = 0.05, 4.0
-"""Way in a step, over the object's height, to which the least drag limits an object that nothing but it bears; and first
-drag after something changes, over the least."""
-_STIFFER, _SOFTER, _TRIES = 4.0, 0.5, 4
+_SLOWEST, _BEGINS = 0.05, 2.0
+"""Way in a step, over the object's height, to which the drag limits an object that nothing but it bears; and first drag
+after something changes, over that one."""
+_STIFFER, _SOFTER, _TRIES = 4.0, 0.4, 4
 """Factors on the drag after a step that fails, and after one of few solves; and attempts at a step."""
-_FEW, _MOST = 10, 40
+_FEW, _MOST = 10, 20
 """Linear solves of a step from which on the drag is not reduced, and with which an attempt ends."""
 
 
@@ -68,13 +69,14 @@ class Ride:
 
     Attributes:
         weight: Weight of the object [N].
-        least: Least drag [N/m].
+        budget: Linear solves that may be taken.
+        least: Drag with which the object's weight alone moves it by a twentieth of its height in a step [N/m].
     """
 
     def __init__(
         self, model: ContactModel, history: History, name: str, height: float, budget: SearchBudget | None = None
     ) -> None:
-        self._model, self._history, self._name, self._budget = model, history, name, budget or SearchBudget(None)
+        self._model, self._history, self._name, self.budget = model, history, name, budget or SearchBudget(None)
         self._bears = -model.pull(name)
         each = np.linalg.norm(self._bears, axis=1)
         self.weight = float(each.sum())
@@ -102,10 +104,11 @@ class Ride:
                 way = np.linalg.norm(found.last.displacement - after.last.displacement, axis=1)
                 done = RideStep(found, self._drag * float(self._share @ way), self._drag)
                 if found.spent <= _FEW:
-                    self._drag = max(_SOFTER * self._drag, self.least)
+                    enough = min(1.0, done.left / self.weight) * self.least
+                    self._drag = max(_SOFTER * self._drag, enough)
                 return done
             self._drag *= _STIFFER
-            if self._budget.exhausted:
+            if self.budget.exhausted:
                 return None
         self._drag = _BEGINS * self.least
         return None
@@ -131,6 +134,6 @@ class Ride:
             nodal=(lambda share: borne * self._bears) if borne else None,
             drag=drag * self._share if drag else None,
             halvings=0 if drag else 1,
-            solves=min(_MOST, self._budget.next),
+            solves=min(_MOST, self.budget.next),
         )
-        return self._budget.counted(found)
+        return self.budget.counted(found)

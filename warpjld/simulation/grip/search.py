@@ -31,8 +31,8 @@ the search ends."""
 _AMPLE = 4.0
 """Ratio of available friction to weight above which more force would not help."""
 _FIRMER = 1.4
-"""Least ratio of capacities of a grip that does not hold and the next one, until one holds: what an object that turns or
-rolls out of a grip is short of is not known by its weight. Trials between the two follow."""
+"""Least ratio of capacities of a grip that does not hold and the next one, until one holds: what an object that turns
+or rolls out of a grip is short of is not known by its weight. Trials between the two follow."""
 _TRIALS = 24
 """Most grips tried; with slopes three or four are enough."""
 
@@ -241,8 +241,15 @@ class _Search:
         if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # a capacity of 1 is not enough
             self._needed = self._aim * trial.able / trial.borne
         self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
-        rolls = self._bracket.above is None and trial.outcome in (TrialOutcome.GIVES, TrialOutcome.SANK)
-        self._bracket.target = max(self._needed, _FIRMER * trial.able) if rolls else self._needed
+        self._bracket.target = max(self._needed, self._firmer(trial))
+
+    def _firmer(self, trial: Trial) -> float:
+        """Least capacity to try next after an object turned or rolled out of a grip; 0 after other outcomes."""
+        rolls = any(one.outcome in (TrialOutcome.GIVES, TrialOutcome.SANK) for _, one in self.trials)
+        below, above = self._bracket.below, self._bracket.above
+        if not rolls or below is None or not below.value > 0.0:
+            return 0.0
+        return _FIRMER * below.value if above is None else float(np.sqrt(below.value * above.value))
 
     def _near(self, trial: Trial) -> bool:
         """Whether the capacity exceeds the target by no more than the tolerance."""

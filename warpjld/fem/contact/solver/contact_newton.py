@@ -219,7 +219,7 @@ class ContactNewton:
         return length
 
     def _unconstrained(self, step: LoadStep) -> UnconstrainedBodies:
-        """Bodies that nothing but contact holds; none with inertia or in a viscous medium, which resist every motion."""
+        """Bodies that nothing but contact holds; none with inertia or drag, which resist every motion."""
         known = step.prescribed
         if step.inertia is not None or step.loads.drag is not None:
             known = Prescribed(np.arange(self.body.degrees), np.zeros(self.body.degrees))

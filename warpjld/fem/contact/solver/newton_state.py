@@ -169,7 +169,7 @@ class NewtonState:
         return self.system.predicted(self.contact, self.states, move, self.step.allowed, self.predicts)
 
     def pull(self, u: Array) -> Array:
-        """External, inertial, viscous and minus internal forces of the bodies at displacement u, without contact [N], (3N,)."""
+        """External and minus internal forces of the bodies at displacement u, without contact [N], shape (3N,)."""
         return self._external(u) - self.elastic.forces(u).forces
 
     def _external(self, u: Array) -> Array:
