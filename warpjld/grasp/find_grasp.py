@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -192,15 +192,29 @@ def find_grasp(
         if good or (best and 2 * tried >= count):
             break
     if best is None:
-        turned_down = sum(one.turned_down for one in draws.values())
-        blocked = f", or out of reach: {', '.join(around.names)} blocked {turned_down} more" if around else ""
-        with_palm = ", palm and digits on it" if palm else ""
-        taken = ", ".join(dict.fromkeys(kinds[: -(-count // _ROUND)]))
-        raise InputError(
-            f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
-            f"(postures {taken}){with_palm}: {fault_of(draws[first], friction)}{blocked}"
-        )
+        taken = dict.fromkeys(kinds[: -(-count // _ROUND)])
+        raise InputError(_no_grasp(thing, draws, first, taken, around, tried, friction, palm))
     return replace(best, tried=tried)
+
+
+def _no_grasp(
+    thing: GraspObject,
+    draws: dict[str, Draws],
+    first: str,
+    taken: Iterable[str],
+    around: Obstacles,
+    tried: int,
+    friction: float,
+    palm: bool,
+) -> str:
+    """Message that no placement led to a grasp, with the likely cause."""
+    turned_down = sum(one.turned_down for one in draws.values())
+    blocked = f", or out of reach: {', '.join(around.names)} blocked {turned_down} more" if around else ""
+    with_palm = ", palm and digits on it" if palm else ""
+    return (
+        f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
+        f"(postures {', '.join(taken)}){with_palm}: {fault_of(draws[first], friction)}{blocked}"
+    )
 
 
 def check_opposing(digits: Sequence[str]) -> None:
