@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 __all__ = ["ObjectSupport", "handle_of"]
 
+_FADED = 0.01
+"""Viscosity at the end over that while the hand closes: it goes as the object comes to rest, so that hardly anything
+has to move once it is gone; searches reduce it likewise."""
 _HANDED_OVER = 0.25
 """Fraction of the time between the hand's closing and the end in which the weight is handed over."""
 
@@ -27,7 +30,7 @@ class ObjectSupport:
         begins: Time from which on the object rides along; infinite: never.
         over: Time from which on its weight is handed over.
         free: Time from which on the hand alone holds it.
-        drag: Viscosity of the medium for the whole object [N × frame / m].
+        drag: Viscosity of the medium for the whole object while the hand closes [N × frame / m].
     """
 
     axis: int
@@ -42,7 +45,9 @@ class ObjectSupport:
 
     def resistance(self, time: float) -> float:
         """Viscosity of the medium at a time [N × frame / m]; 0 before and after."""
-        return 0.0 if self.stands(time) or time >= self.free - 1e-9 else self.drag
+        if self.stands(time) or time >= self.free - 1e-9:
+            return 0.0
+        return float(self.drag * _FADED ** max(0.0, (time - self.over) / (self.free - self.over)))
 
     def borne(self, time: float) -> float:
         """Share of the weight that is borne while the object rides along; 0 before and after."""

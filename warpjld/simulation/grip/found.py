@@ -22,10 +22,8 @@ __all__ = ["FoundGrip", "SupportRelease", "digits_that_press", "trial_row", "wri
 _PRESSES = 0.01
 """Force relative to that of the strongest digit above which a digit counts as pressing: flesh between two digits
 transmits a little to both."""
-_STEPS, _SOFTER = 5, 0.5
-"""Load steps in which the weight is handed over and the object comes to rest, and their drag over that which would let
-the weight alone move it by a twentieth of its height in a step: in searches, what was left to balance then became a
-third in a step."""
+_STEPS = 6
+"""Load steps in which the weight is handed over and the object comes to rest; searches took 4 to 6."""
 _COLUMNS = (
     *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
     *("chosen", "status"),
@@ -60,9 +58,7 @@ class SupportRelease:
         """The object with its support released, if it is the named one; others unchanged."""
         if one.name != self.object or one.support is None:
             return one
-        return replace(
-            one, support=one.support.released(self.begins, self.over, self.free, _SOFTER * self.drag * self.step)
-        )
+        return replace(one, support=one.support.released(self.begins, self.over, self.free, self.drag * self.step))
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,8 +35,8 @@ _RESTS, _STEPS = 0.02, 40
 then."""
 _FINER = 0.1
 """The former share once more, over its first value, if no equilibrium without the medium was found there."""
-_FAR = 0.25
-"""Way under the weight, over the object's height, from which on it counts as not held; also that which it would still
+_FAR, _AHEAD = 0.25, 0.1
+"""Way under the weight, over the object's height, from which on it counts as not held; and that which it would still
 have to go until it rests."""
 _ON = 2
 """Successive steps after which it would still have to go so far, for it to count as not held."""
@@ -155,7 +155,7 @@ class HandTrials(WeightTrials):
         if before is None or now.left < _RESTS * self.weight.weight:
             return 0
         held_back = now.drag * (before.left / now.left - 1.0)
-        if held_back * _FAR * self.weight.tall >= now.left:
+        if held_back * _AHEAD * self.weight.tall >= now.left:
             return 0
         return 1 if held_back > 0.0 else 2
 
