@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,8 +15,6 @@ from numpy.typing import NDArray
 from warpjld.fem import Body, LinearElastic, Prescribed, box_hexes, merge, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
-from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent
-from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.script import Interpreter, Scene
@@ -23,7 +22,7 @@ from warpjld.script.contact import SceneAnimation
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel, PairOwners
 from warpjld.simulation.bodies.object_body import build_object_body
-from warpjld.simulation.grip.hold import HandTrials
+from warpjld.simulation.grip.hand_trials import HandTrials
 from warpjld.simulation.grip.search import GripStatus, TrialOutcome, gentlest_grip
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.specification import GripSpecification
@@ -60,27 +59,17 @@ class Squeeze:
     def __init__(self, model: ContactModel) -> None:
         self.model, self.hand, self.history = model, model.hands[0], History()
         self.time, self.budget = 1.0, SearchBudget()
-        self._closed: dict[float, ContactSolution] = {}
 
-    def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
-        hands = replace(self.hand, moves=lambda time: 0.0), replace(self.hand, moves=lambda time: 1.0)  # type: ignore[arg-type,return-value]
-        apart, closing = (replace(self.model, hands=(hand,)).prescribed(1.0, History()) for hand in hands)
-        change = np.zeros(self.model.body.degrees)
-        change[apart.degrees] = closing.values - apart.values
-        tangent = EquilibriumTangent(self.model.body, self.model.pairs, closed, apart.degrees, steadied=True)
-        return tangent, Perturbation(prescribed=change)
+    @cached_property
+    def first(self) -> ContactSolution:
+        known, loads = (lambda time: self.model.prescribed(time, History())), self.model.loads_at(0.0, History())
+        return press(self.model.body, known, self.model.pairs, lambda time: loads, times=(1.0,))
 
-    def closed(self, grip: float) -> ContactSolution:
-        if grip not in self._closed:
-            hand = replace(self.hand, moves=lambda time: min(time, 1.0) * grip)  # type: ignore[arg-type,return-value]
-            here = replace(self.model, hands=(hand,))
-            known, loads = (
-                (lambda time: here.prescribed(time, History())),
-                (lambda time: here.loads_at(time, History())),
-            )
-            found = press(here.body, known, here.pairs, loads, times=(1.0,), solves=self.budget.next, check=False)
-            self._closed[grip] = self.budget.counted(found)
-        return self._closed[grip]
+    def closes(self, before: float, grip: float) -> tuple[str, Callable[[float], float]]:
+        return self.hand.name, lambda share: before + share * (grip - before)
+
+    def steps(self, before: float, grip: float, travel: float) -> int:
+        return max(1, math.ceil((grip - before) / travel))
 
     def stays(self, grip: float) -> tuple[str, Callable[[float], float]]:
         return self.hand.name, lambda share: grip
@@ -140,7 +129,7 @@ def test_the_gentlest_grip_takes_the_block_from_its_foot(lift: HandTrials) -> No
 
 @pytest.mark.parametrize("solves", [0, 8])  # 0: not one load step of closing is solved
 def test_a_search_ends_with_its_linear_solves(lift: HandTrials, solves: int) -> None:
-    lift.budget = lift.squeeze.budget = SearchBudget(solves)
+    lift.budget = lift.squeeze.budget = lift.ride.budget = SearchBudget(solves)
     found = gentlest_grip(
         lift,
         5e-5,
@@ -157,14 +146,16 @@ def test_a_search_ends_with_its_linear_solves(lift: HandTrials, solves: int) -> 
 
 
 def test_a_block_with_a_floor_below_stands_on_it(lift: HandTrials) -> None:
-    squeeze, model = lift.squeeze, lift.squeeze.model
+    model = lift.squeeze.model
     floor = Plane((0.0, 0.0, -0.5 * EDGE - 5e-5), (0.0, 0.0, 1.0))
-    squeeze.model = replace(
-        model,
-        pairs=(*model.pairs, Pair(model.objects[0].faces, floor, FRICTION)),
-        owners=(*model.owners, PairOwners("BLOCK", "FLOOR")),
+    squeeze = Squeeze(
+        replace(
+            model,
+            pairs=(*model.pairs, Pair(model.objects[0].faces, floor, FRICTION)),
+            owners=(*model.owners, PairOwners("BLOCK", "FLOOR")),
+        )
     )
-    standing = HandTrials(squeeze, model.objects[0])
+    standing = HandTrials(squeeze, model.objects[0])  # type: ignore[arg-type]
     trial = standing(1.5e-4)
     assert trial.outcome is TrialOutcome.STANDS
     assert trial.note.startswith("FLOOR bears ")

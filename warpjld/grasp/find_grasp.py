@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from warpjld.grasp.random_placements import Draws
 from warpjld.grasp.refusal import fault_of, refuse_what_is_too_wide
 from warpjld.skeleton import Poses, Skeleton
 
-__all__ = ["AutoGrasp", "find_grasp"]
+__all__ = ["AutoGrasp", "check_opposing", "find_grasp"]
 
 _ROUND = 32  # placements per round (batch)
 _FINALISTS = 6  # placements of a round that are closed and judged in full
@@ -93,6 +93,7 @@ def find_grasp(
     coupling: tuple[float, float] | None = (1.0, 0.7),
     friction: float = 0.6,
     palm: bool = False,
+    digits: Sequence[str] = (),
     seed: int = 0,
 ) -> AutoGrasp:
     """Find a grasp: sample placements of an open hand around the object, close each, judge it, keep the best.
@@ -122,11 +123,14 @@ def find_grasp(
         posture: The only one of ``POSTURES`` that is tried; chosen by the object's shape if left out.
         coupling: See :meth:`~warpjld.grasp.close.Closer.close`.
         friction: Coulomb coefficient.
+        digits: Names of the only digits that close, without side: the thumb, and a finger other than the pinky to
+            oppose it; by default those of the posture.
         palm: Accept power grips only: the palm and all digits but one are in contact.
         seed: Seed of the random numbers.
 
     Raises:
-        InputError: No hand, no such posture, an object that is nowhere narrow enough, or no placement led to a grasp.
+        InputError: No hand, no such posture, digits that cannot oppose each other, an object that is nowhere narrow
+        enough, or no placement led to a grasp.
 
     Examples:
         >>> hand = wj.build_hand("left", resolution=1500)
@@ -138,20 +142,24 @@ def find_grasp(
         raise InputError(f"count: want 1 or more, got {count}")
     check_friction(friction)
     side = hand_side(covering, side)
+    check_opposing(digits)
     first = posture or posture_for(thing.size)
     others = [kind for kind in _OTHERS if kind != first]
     kinds = [first] if posture else [kind for other in others for kind in (first, other)]
     closer = closer or Closer(covering, thing)
     around, rng = Obstacles(covering, obstacles), np.random.default_rng(seed)
     judge = Judge(closer.both, side, friction)
-    draws = {kind: Draws(covering, closer.both.near, around, side, kind, rng) for kind in dict.fromkeys(kinds)}
+    draws = {
+        kind: Draws(covering, closer.both.near, around, side, kind, rng, digits=tuple(digits))
+        for kind in dict.fromkeys(kinds)
+    }
     refuse_what_is_too_wide(draws[first], friction)
     best: AutoGrasp | None = None
     tried = 0
     for number in range(-(-count // _ROUND)):
         kind = best.posture if best else kinds[number % len(kinds)]
-        digits = [f"{side}.{digit}" for digit in draws[kind].closing]
-        how = {"digits": digits, "coupling": coupling}
+        closing = [f"{side}.{digit}" for digit in draws[kind].closing]
+        how = {"digits": closing, "coupling": coupling}
         hands = draws[kind].draw(min(_ROUND, count - number * _ROUND))
         tried += len(hands)
         finalists = _promising(judge, closer, side, hands, around, how)
@@ -159,16 +167,16 @@ def find_grasp(
             least = best.score if best else 0.0
             if verdict.score <= least:
                 break
-            if palm and not _power(verdict, digits):
+            if palm and not _power(verdict, closing):
                 continue
             # digits that cross one another are separated last, because this is expensive
             there = closer.parted(hand.poses(covering.skeleton), hand.angles, closed)
             (verdict,) = _verdicts(judge, covering, hand, there)
-            if verdict.depth > _DEEPEST or verdict.score <= least or (palm and not _power(verdict, digits)):
+            if verdict.depth > _DEEPEST or verdict.score <= least or (palm and not _power(verdict, closing)):
                 continue
             if around and _runs_into(covering, hand, there.angles, around):
                 continue
-            touching = tuple(name for name in digits if name.removeprefix(f"{side}.") in verdict.digits)
+            touching = tuple(name for name in closing if name.removeprefix(f"{side}.") in verdict.digits)
             best = AutoGrasp(
                 kind,
                 hand.position[0],
@@ -180,19 +188,45 @@ def find_grasp(
                 touching,
                 tried,
             )
-        good = best and best.score >= _GOOD and len(best.touching) >= len(digits) - (len(digits) > 3)
+        good = best and best.score >= _GOOD and len(best.touching) >= len(closing) - (len(closing) > 3)
         if good or (best and 2 * tried >= count):
             break
     if best is None:
-        turned_down = sum(one.turned_down for one in draws.values())
-        blocked = f", or out of reach: {', '.join(around.names)} blocked {turned_down} more" if around else ""
-        with_palm = ", palm and digits on it" if palm else ""
-        taken = ", ".join(dict.fromkeys(kinds[: -(-count // _ROUND)]))
-        raise InputError(
-            f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
-            f"(postures {taken}){with_palm}: {fault_of(draws[first], friction)}{blocked}"
-        )
+        taken = dict.fromkeys(kinds[: -(-count // _ROUND)])
+        raise InputError(_no_grasp(thing, draws, first, taken, around, tried, friction, palm))
     return replace(best, tried=tried)
+
+
+def _no_grasp(
+    thing: GraspObject,
+    draws: dict[str, Draws],
+    first: str,
+    taken: Iterable[str],
+    around: Obstacles,
+    tried: int,
+    friction: float,
+    palm: bool,
+) -> str:
+    """Message that no placement led to a grasp, with the likely cause."""
+    turned_down = sum(one.turned_down for one in draws.values())
+    blocked = f", or out of reach: {', '.join(around.names)} blocked {turned_down} more" if around else ""
+    with_palm = ", palm and digits on it" if palm else ""
+    return (
+        f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
+        f"(postures {', '.join(taken)}){with_palm}: {fault_of(draws[first], friction)}{blocked}"
+    )
+
+
+def check_opposing(digits: Sequence[str]) -> None:
+    """Check digits that are to close alone.
+
+    Raises:
+        InputError: The thumb has no finger to oppose, or the other way round.
+    """
+    if digits and not ("thumb" in digits and set(digits) & {"index", "middle", "ring"}):
+        raise InputError(
+            f"digits: want thumb and one or more of index, middle, ring to oppose it, got {' '.join(digits)}"
+        )
 
 
 def _power(verdict: Verdict, digits: Sequence[str]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,6 +48,7 @@ class Draws:
         posture: Name of the posture.
         rng: Source of random numbers.
         turned_down: Number of placements rejected so far because of obstacles.
+        digits: Names of the only digits that close, without side; empty: those of the posture.
     """
 
     covering: Covering
@@ -56,6 +58,7 @@ class Draws:
     posture: str
     rng: np.random.Generator
     turned_down: int = 0
+    digits: Sequence[str] = ()
 
     @cached_property
     def start(self) -> NDArray[np.float64]:
@@ -64,9 +67,10 @@ class Draws:
 
     @cached_property
     def closing(self) -> list[str]:
-        """Names of the digits that close in this posture, without side."""
+        """Names of the digits that close, without side: those that were named, or those of the posture."""
         there = digit_chains(self.covering.skeleton)
-        return [digit for digit in CLOSING.get(self.posture, DIGITS) if f"{self.side}.{digit}" in there]
+        wanted = self.digits or CLOSING.get(self.posture, DIGITS)
+        return [digit for digit in wanted if f"{self.side}.{digit}" in there]
 
     @cached_property
     def widest(self) -> float:

@@ -29,12 +29,21 @@ _BEFORE = 0.6
 
 
 def grasp_by_itself(
-    scene: Scene, actor: Actor, prop: Prop, side: str, first: float, last: float, tries: int, posture_name: str | None
+    scene: Scene,
+    actor: Actor,
+    prop: Prop,
+    side: str,
+    first: float,
+    last: float,
+    tries: int,
+    posture_name: str | None,
+    digits: Sequence[str] = (),
 ) -> Attempt:
     """Find a grasp, and set keys: the open hand away from the object at ``first``, on it half-way, closed at ``last``.
 
     A single hand is moved as a whole; a body's hand is moved by its arm from its pose at ``first``, and the trunk does
-    not move. The other objects, at their placements at ``last``, are obstacles.
+    not move. The other objects, at their placements at ``last``, are obstacles. ``digits``, without side, are the only
+    ones that close; empty: those of the posture.
 
     Raises:
         InputError: Nothing was found.
@@ -50,10 +59,17 @@ def grasp_by_itself(
     obstacles = [placed_at(scene, other, last) for other in scene.props.values() if other is not prop]
     closer, middle = Closer(covering, thing, device=scene.device), (first + last) / 2.0
     if f"{side}.shoulder" in actor.skeleton.names:
-        found = _by_arm(scene, actor, closer, side, (first, middle, last), obstacles, tries, posture_name)
+        found = _by_arm(scene, actor, closer, side, (first, middle, last), obstacles, tries, posture_name, digits)
     else:
         found = find_grasp(
-            covering, thing, closer=closer, obstacles=obstacles, side=side, count=tries, posture=posture_name
+            covering,
+            thing,
+            closer=closer,
+            obstacles=obstacles,
+            side=side,
+            count=tries,
+            posture=posture_name,
+            digits=digits,
         )
         carry(scene, actor, found, (first, middle, last))
     key_grip(scene, actor, found, (first, middle, last))
@@ -128,6 +144,7 @@ def _by_arm(
     obstacles: Sequence[GraspObject],
     tries: int,
     posture_name: str | None,
+    digits: Sequence[str],
 ) -> AutoGrasp:
     """Find a grasp within the arm's reach, and set the arm's keys: in front of the object, then at it."""
     from warpjld.script.grasp_by_arm import grasp_in_reach
@@ -136,7 +153,15 @@ def _by_arm(
 
     first, middle, last = frames
     found = grasp_in_reach(
-        scene, actor, closer, side, (middle, last), obstacles=obstacles, count=tries, posture_name=posture_name
+        scene,
+        actor,
+        closer,
+        side,
+        (middle, last),
+        obstacles=obstacles,
+        count=tries,
+        posture_name=posture_name,
+        digits=digits,
     )
     _, angles = posture(scene, actor, first)
     moments = ((first, found.arm.values(angles[0])), (first + _BEFORE * (middle - first), found.before))

@@ -62,6 +62,7 @@ def grasp_in_reach(
     obstacles: Sequence[GraspObject],
     count: int,
     posture_name: str | None,
+    digits: Sequence[str] = (),
 ) -> ArmGrasp:
     """Search for grasps until the arm reaches one, inside its limits and without passing through the body.
 
@@ -71,7 +72,7 @@ def grasp_in_reach(
         closer: ``Closer`` of its hand and the object.
         side: ``left`` or ``right``.
         frames: Frames at which the open hand is at the object, and at which it has closed.
-        obstacles: As for ``find_grasp``; likewise ``count`` and ``posture_name``.
+        obstacles: As for ``find_grasp``; likewise ``count``, ``posture_name`` and ``digits``.
 
     Raises:
         InputError: No grasp was found, or none is within reach; states how far the arm is short of the nearest.
@@ -91,6 +92,7 @@ def grasp_in_reach(
                 side=side,
                 count=count,
                 posture=posture_name,
+                digits=digits,
                 seed=seed,
             )
         except InputError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -16,6 +17,7 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.correct_frames import correct_frame, uncorrected
 from warpjld.simulation.grip.find import find_grip
 from warpjld.simulation.grip.found import FoundGrip
+from warpjld.simulation.grip.hand_trials import RIDING
 from warpjld.simulation.grip.kept import grip_content, restored_grip
 from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightBone
@@ -232,8 +234,12 @@ class _Run:
         if all(one.last <= model.start + since or one.first > model.start + since for one in closing):
             return steps
         ends, count = (since, steps[-1]), len(steps)
+        travel = RIDING if any(one.release is not None for one in self.grips) else TRAVEL
         for hand in (one for one in model.hands if any(one.name == grip.actor for grip in closing)):
-            count = max(count, hand.bones.steps([(hand.bones.angles(at), at) for at in ends], TRAVEL))
+            count = max(count, hand.bones.steps([(hand.bones.angles(at), at) for at in ends], travel))
+        for release in (one.release for one in self.grips if one.release is not None):
+            if release.over < steps[-1] and since < release.free:
+                count = max(count, math.ceil((steps[-1] - since) / release.step - 1e-9))
         return [since + (steps[-1] - since) * (k + 1) / count for k in range(count - 1)] + [steps[-1]]
 
     def save(self, checkpoint: CheckpointFile) -> bool:
@@ -321,5 +327,4 @@ class _Run:
         self.model = self.model.edited(edits)
 
     def _note(self, solved: SolvedFrame) -> None:
-        time = solved.frame - self.model.start
-        self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
+        self.history = self.model.after(solved.nodal)

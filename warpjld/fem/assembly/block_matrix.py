@@ -74,6 +74,12 @@ class BlockMatrix:
         """Diagonal blocks, shape (N, 3, 3)."""
         return np.asarray(self.values[self.on_diagonal])
 
+    def with_diagonal(self, added: NDArray[Any]) -> BlockMatrix:
+        """A copy with a value per node, shape (N,), added to the diagonal."""
+        values = self.values.copy()
+        values[self.on_diagonal] += added[:, None, None] * np.eye(3)
+        return BlockMatrix(self.rows, self.columns, values)
+
     def masked(self, free: Mask, dtype: Any = np.float64) -> BlockMatrix:
         """K11 at full size: rows and columns of prescribed degrees of freedom are set to zero (R107).
 

@@ -88,9 +88,7 @@ class Inertia:
 
     def added_to(self, matrix: BlockMatrix) -> BlockMatrix:
         """A matrix with m/Δt² added."""
-        values = matrix.values.copy()
-        values[matrix.on_diagonal] += (self.masses / self.length**2)[:, None, None] * np.eye(3)
-        return BlockMatrix(matrix.rows, matrix.columns, values)
+        return matrix.with_diagonal(self.masses / self.length**2)
 
     def velocity_at(self, u: Array) -> Array:
         """Velocity at the end of the step, where the displacement is u (3N,) [m/s], shape (3N,)."""

@@ -50,6 +50,9 @@ class Loads:
         traction: Force per rest area on named faces [Pa], of constant direction.
         forces: Point load [N], distributed equally over the nodes of a set.
         nodal: Nodal forces [N], shape (N, 3), or None.
+        drag: Viscosity of a medium around the nodes, force over speed [N per m and unit of time], shape (N,), or None.
+            It opposes motion since the start of a load step, and leaves no force once nothing moves; ``press`` alone
+            knows it.
     """
 
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -58,6 +61,7 @@ class Loads:
     traction: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     forces: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     nodal: Array | None = None
+    drag: Array | None = None
 
     @property
     def follows(self) -> bool:
@@ -80,6 +84,7 @@ class Loads:
             traction={name: _scaled(t, share) for name, t in self.traction.items()},
             forces={name: _scaled(f, share) for name, f in self.forces.items()},
             nodal=None if self.nodal is None else share * self.nodal,
+            drag=self.drag,
         )
 
 

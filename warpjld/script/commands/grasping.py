@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
+from warpjld.errors import InputError
 from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import read_object
 from warpjld.script.facets import read_facet, read_vertex
@@ -69,11 +70,11 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
     syntax=(
         "GRASP <key1> <key2> [LEFT/RIGHT] <object> [THUMB/INDEX/MIDDLE/RING/PINKY …] "
         "[COUPLING <second joint> <third joint>], or GRASP <key1> <key2> [LEFT/RIGHT] <object> AUTO "
-        "[TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>], or GRASP <key1> <key2> BOTH <object> AUTO "
-        "[TRIES <placements>]"
+        "[THUMB/INDEX/MIDDLE/RING/PINKY …] [TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>], or "
+        "GRASP <key1> <key2> BOTH <object> AUTO [TRIES <placements>]"
     ),
     help="Close digits on an object between key1 and key2; COUPLING flexes joints together; AUTO also places the "
-    "hand, BOTH two.",
+    "hand, for the digits named to oppose each other, BOTH two.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:
@@ -125,10 +126,18 @@ def _check_size(actor: Actor, prop: Prop, arguments: Arguments) -> None:
 def _grasp_auto(  # type: ignore[no-untyped-def]
     scene: Scene, arguments: Arguments, side: str, prop, first: float, last: float
 ) -> None:
-    """GRASP … AUTO: read its options, search, and set the keys."""
+    """GRASP … AUTO: read its digits and options, search, and set the keys."""
+    from warpjld.grasp.find_grasp import check_opposing
     from warpjld.grasp.postures import POSTURES
     from warpjld.script.grasp_auto import grasp_by_itself
 
+    digits = []
+    while digit := arguments.keyword(*DIGIT_WORDS):
+        digits.append(digit.lower())
+    try:
+        check_opposing(digits)
+    except InputError as error:
+        raise arguments.error(error.message) from error
     options = arguments.options(
         tries=lambda: arguments.integer("the number of placements to try", minimum=1, maximum=100_000),
         posture=lambda: arguments.choice("the posture", [name.upper() for name in POSTURES]).lower(),
@@ -138,7 +147,7 @@ def _grasp_auto(  # type: ignore[no-untyped-def]
     if scene.dry:
         _leave_keys(scene, actor, prop, side, first, last, ())
         return
-    scene.attempts.append(grasp_by_itself(scene, actor, prop, side, first, last, tries, posture))
+    scene.attempts.append(grasp_by_itself(scene, actor, prop, side, first, last, tries, posture, digits))
 
 
 def _grasp_both(scene: Scene, arguments: Arguments, first: float, last: float) -> None:

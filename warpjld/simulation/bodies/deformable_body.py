@@ -15,34 +15,19 @@ from warpjld.fem.contact.interface.pairs import Exclusion
 from warpjld.fem.mesh.embedding import Embedding
 from warpjld.simulation.bodies.skin_parts import SkinParts
 
-__all__ = ["Bearing", "DeformableBody", "History", "Surroundings"]
-
-
-@dataclass(frozen=True, eq=False)
-class Bearing:
-    """Reactions of an object's support at the moment its release begins.
-
-    Attributes:
-        forces: Reactions of the points the object stands on [N], shape (N, 3).
-        height: Displacement of the object's handle node along the axis of gravity [m].
-    """
-
-    forces: NDArray[np.float64]
-    height: float
+__all__ = ["DeformableBody", "History", "Surroundings"]
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Facts about earlier equilibria that predictors and released supports depend on.
+    """Facts about earlier equilibria that predictors depend on.
 
     Attributes:
         carried: Object → hand that presses most on it, for objects in contact with hands only; the predictor moves them
             along with that hand.
-        bearing: Support reactions at the begin of the release, by object.
     """
 
     carried: Mapping[str, str] = field(default_factory=dict)
-    bearing: Mapping[str, Bearing] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

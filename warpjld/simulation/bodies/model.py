@@ -12,8 +12,9 @@ from warpjld.errors import InputError
 from warpjld.fem import Body, Loads, Material, Prescribed, merge
 from warpjld.fem.contact import Bond, Obstacle, Pair
 from warpjld.fem.contact.results.nodal_contact import tributary_areas
+from warpjld.fem.load.loads import external_forces
 from warpjld.simulation.animation import AngleEdit, Animation
-from warpjld.simulation.bodies.deformable_body import Bearing, DeformableBody, History, Surroundings
+from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.bodies.surface_offset import face_offsets, node_offsets
@@ -99,14 +100,17 @@ class ContactModel:
         return out
 
     def loads_at(self, time: float, history: History) -> Loads:
-        """External loads at a time, including the fading reactions of released supports."""
+        """External loads at a time, including what bears and resists objects that ride along with a hand."""
         out = np.zeros((0, 3))
-        for one in self.objects:
-            fading = None if one.support is None else one.support.fading(time, history.bearing.get(one.name))
-            if fading is not None:
-                out = out if len(out) else np.zeros_like(self.body.mesh.nodes)
-                out[self.spans[one.name]] += fading
         loads, frame = self.loads, self.start + time
+        for one in self.objects:
+            if one.support is not None and one.support.resistance(time):
+                out = out if len(out) else np.zeros_like(self.body.mesh.nodes)
+                pull = self.pull(one.name)
+                out -= one.support.borne(time) * pull
+                each = np.linalg.norm(pull, axis=1)
+                drag = one.support.resistance(time) * each / each.sum()
+                loads = replace(loads, drag=drag if loads.drag is None else loads.drag + drag)
         for one in self.objects:
             if one.loads:
                 out = out if len(out) else np.zeros_like(self.body.mesh.nodes)
@@ -114,31 +118,20 @@ class ContactModel:
                 loads = one.loads.added_to(loads, frame)
         return replace(loads, nodal=out) if len(out) else loads
 
-    def after(
-        self,
-        history: History,
-        time: float,
-        displacement: NDArray[np.float64],
-        reactions: NDArray[np.float64],
-        nodal: NDArray[np.float64],
-    ) -> History:
-        """History updated by an equilibrium: which hand holds each free object, and support reactions.
+    def pull(self, name: str) -> NDArray[np.float64]:
+        """Weight of an object on all nodes [N], shape (N, 3)."""
+        whole = external_forces(self.body, Loads(gravity=self.loads.gravity)).reshape(-1, 3)
+        out = np.zeros_like(whole)
+        out[self.spans[name]] = whole[self.spans[name]]
+        return out
 
-        Args:
-            history: History before the equilibrium.
-            time: Its time [frames].
-            displacement: Displacements of all nodes [m], shape (N, 3).
-            reactions: Reactions of the Dirichlet conditions [N], shape (N, 3).
-            nodal: Contact forces of each pair [N], shape (P, N, 3).
-        """
+    def after(self, nodal: NDArray[np.float64]) -> History:
+        """History after an equilibrium with contact forces of each pair [N], shape (P, N, 3): which hand holds each
+        free object."""
         hands = {hand.name for hand in self.hands}
         carried: dict[str, str] = {}
-        bearing: dict[str, Bearing] = dict(history.bearing)
         for one in self.objects:
             span = self.spans[one.name]
-            if one.support is not None:
-                borne = one.support.bearing(time, displacement[span], reactions[span])
-                bearing |= {} if borne is None else {one.name: borne}
             pushes: dict[str, float] = {}
             for owner, forces in zip(self.owners, nodal[:, span], strict=True):
                 other = owner.other(one.name)
@@ -146,7 +139,7 @@ class ContactModel:
                     pushes[other] = pushes.get(other, 0.0) + float(np.linalg.norm(forces, axis=1).sum())
             if pushes and set(pushes) <= hands:
                 carried[one.name] = max(pushes, key=lambda name: pushes[name])
-        return History(carried, bearing)
+        return History(carried)
 
     def edited(self, edits: Sequence[AngleEdit]) -> ContactModel:
         """A copy driven by its animation with edits applied; hands, objects and obstacles that change are replaced."""

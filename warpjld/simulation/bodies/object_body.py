@@ -19,7 +19,7 @@ from warpjld.simulation.animation import ObjectAnimation
 from warpjld.simulation.bodies.applied_loads import AppliedLoads, applied_loads
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
-from warpjld.simulation.bodies.support import ObjectSupport, handle_of
+from warpjld.simulation.bodies.support import ObjectSupport
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, located
 from warpjld.simulation.state_variables import Points, PrescribedPoints
 
@@ -72,7 +72,7 @@ class ObjectBody(DeformableBody):
         return any(self.holds(state, time) for state, _ in self.states)
 
     def _guided(self, time: float) -> bool:
-        """Whether conditions of a branch, or the handle of its support, drive it instead of its state variables."""
+        """Whether conditions of a branch drive it instead of its state variables, or it rides along with a hand."""
         if self.other is not None:
             return True
         return self.support is not None and not self.support.stands(time) and time < self.support.free
@@ -82,8 +82,6 @@ class ObjectBody(DeformableBody):
         if self.other is not None:
             return self.other(time)
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
-        if self.support is not None:
-            out = self.support.prescribed(time, history.bearing.get(self.name))
         frame = self.start + time
         for state, nodes in self.states:
             moved = np.zeros((len(nodes), 3))
@@ -228,7 +226,7 @@ def _lifted(
     if grip.weight is not None:
         density = grip.weight / (float(np.abs(pull).max()) * float(volumes(volume.mesh).sum()))
         volume = replace(volume, physical=replace(volume.physical, density=density))
-    return volume, ObjectSupport(handle_of(volume.mesh.nodes), axis)
+    return volume, ObjectSupport(axis)
 
 
 def _mean_shift(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from warpjld.simulation.grip.balanced import BalancedGrip, balanced_grip, with_b
 from warpjld.simulation.grip.find_shared import find_shared
 from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.found import FoundGrip, SupportRelease, digits_that_press, trial_row
-from warpjld.simulation.grip.hold import HandTrials
+from warpjld.simulation.grip.hand_trials import HandTrials
 from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.squeeze import Squeeze
@@ -67,11 +67,7 @@ def find_grip(
         balanced = balanced_grip(request, squeeze, found.grip, joints, _START, tell)
         if balanced is not None:
             return replace(with_balance(found, balanced), edits=_closed_edits(hand, request, balanced))
-    release = None
-    if found.lowered is not None:
-        begins, free = request.middle - model.start, request.last - model.start
-        release = SupportRelease(request.object, begins, free, found.lowered)
-    return replace(found, edits=_edits(squeeze, request, joints, found.grip), release=release)
+    return replace(found, edits=_edits(squeeze, request, joints, found.grip))
 
 
 def _closed_edits(hand: FleshBody, request: GripSpecification, balanced: BalancedGrip) -> tuple[AngleEdit, ...]:
@@ -110,7 +106,7 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: C
     known = {"weight": heavy, "friction": friction, "start": start, "tolerance": _NEAR}
     found = gentlest_grip(hold, 0.0, most, **known, most=_TRIALS, exhausted=lambda: squeeze.budget.exhausted)
     taken = trials.taken(found.grip) if found.status in _HELD else None
-    instant = squeeze.closed(found.grip).last if taken is None else taken[1]
+    instant = trials.closed(found.grip).last if taken is None else taken[1]
     text = f"{heavy:.3g} N of {request.object}: {found.text}"
     if taken is not None:
         text += f"; the digits close on by {math.degrees(found.grip):.2f}°"
@@ -122,8 +118,12 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: C
         for grip, trial in found.trials
     ]
     grip, lowered = (0.0, None) if taken is None else (found.grip, taken[0])
-    digits = digits_that_press(effort)
-    return FoundGrip(request, found.status.name, text, grip, lowered, found.trial.force, digits, tuple(rows))
+    release = None
+    if taken is not None:
+        first, middle, last = (frame - model.start for frame in (request.first, request.middle, request.last))
+        release = SupportRelease(request.object, first, middle, last, trials.ride.least)
+    status, force, digits = found.status.name, found.trial.force, digits_that_press(effort)
+    return FoundGrip(request, status, text, grip, lowered, force, digits, tuple(rows), release=release)
 
 
 def _firm(request: GripSpecification, squeeze: Squeeze, most: float, tell: Callable[[str], None]) -> FoundGrip:

@@ -22,6 +22,8 @@ __all__ = ["FoundGrip", "SupportRelease", "digits_that_press", "trial_row", "wri
 _PRESSES = 0.01
 """Force relative to that of the strongest digit above which a digit counts as pressing: flesh between two digits
 transmits a little to both."""
+_STEPS = 6
+"""Load steps in which the weight is handed over and the object comes to rest; searches took 4 to 6."""
 _COLUMNS = (
     *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
     *("chosen", "status"),
@@ -35,20 +37,28 @@ class SupportRelease:
 
     Attributes:
         object: Name of the object.
-        begins, free: Begin and end of the release [frames from the model's start].
-        lowered: Displacement of the object's handle along the axis of gravity during the release [m].
+        begins: Time from which on it rides along with the closing hand [frames from the model's start].
+        over: Time from which on its weight is handed over.
+        free: Time from which on the hand alone holds it.
+        drag: Drag with which its weight alone would move it by a twentieth of its height in a load step [N/m].
     """
 
     object: str
     begins: float
+    over: float
     free: float
-    lowered: float
+    drag: float
+
+    @property
+    def step(self) -> float:
+        """Longest load step while its weight is handed over [frames]."""
+        return (self.free - self.over) / _STEPS
 
     def applied(self, one: ObjectBody) -> ObjectBody:
         """The object with its support released, if it is the named one; others unchanged."""
         if one.name != self.object or one.support is None:
             return one
-        return replace(one, support=one.support.released(self.begins, self.free, self.lowered))
+        return replace(one, support=one.support.released(self.begins, self.over, self.free, self.drag * self.step))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +70,7 @@ class FoundGrip:
         status: Name of the status with which the search ended.
         text: Summary in one line.
         grip: Angle by which the digits close further, the largest if they differ [rad]; 0 if no grip was found.
-        lowered: Displacement of the object's handle along the axis of gravity when the hand takes its weight [m]; None
+        lowered: Displacement of the object's middle along the axis of gravity when the hand takes its weight [m]; None
             if it does not.
         force: Sum of the normal forces on the object, or of the digits' forces [N].
         digits: Digit → force [N], force limit [N], largest load share.

@@ -1,4 +1,9 @@
-"""Trial grips of arbitrary bodies whose Dirichlet conditions close on an object, without a hand (R122–R124)."""
+"""Trial grips of arbitrary bodies whose Dirichlet conditions close on an object, without a hand (R122–R124).
+
+The object does not move while they close, as no weight acts. Then its weight comes on while the height of a central
+node (the handle) is prescribed, which bears what the bodies do not, and the handle is lowered
+(``warpjld.simulation.grip.lower``).
+"""
 
 from __future__ import annotations
 
@@ -11,11 +16,13 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.body import Body
 from warpjld.fem.contact import ContactInstant, ContactSolution, Pair, press
-from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
 from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.load.prescribed import Prescribed
-from warpjld.simulation.grip.hold import WeightTrials
+from warpjld.simulation.grip.hold import Loaded, WeightTrials
+from warpjld.simulation.grip.lower import Lowering, lower_object
+from warpjld.simulation.grip.search import TrialOutcome
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.shared_weight import SharedWeight
 
@@ -43,6 +50,9 @@ class PrescribedTrials(WeightTrials):
         others: Contact pairs of the object with other bodies; what these bear, the hand does not hold.
         share: Largest load share of the muscles at an instant, and who has it.
         budget: Linear solves that all trials may take; by default those of a grip in a script.
+
+    Attributes:
+        lowered: Descent of the object at every grip whose pressures could bear it.
 
     Raises:
         InputError: No pairs, no such object, or gravity not along one axis.
@@ -72,9 +82,9 @@ class PrescribedTrials(WeightTrials):
         self._closed: dict[float, ContactSolution] = {}
         own = np.unique(mesh.elements[mesh.regions == mesh.region_names.index(name)])
         touching = [*pairs, *others]
-        super().__init__(
-            SharedWeight(body, own, touching, range(len(pairs)), gravity), body, touching, budget or SearchBudget()
-        )
+        super().__init__(SharedWeight(body, own, touching, range(len(pairs)), gravity), budget or SearchBudget())
+        self.body, self.pairs = body, touching
+        self.lowered: dict[float, Lowering] = {}
 
     def closed(self, grip: float) -> ContactSolution:
         """Equilibrium at the grip without gravity, after that at the largest known grip below it."""
@@ -88,6 +98,23 @@ class PrescribedTrials(WeightTrials):
 
             self._closed[grip] = self._press(known, self._loads, begin + 1.0, before)
         return self._closed[grip]
+
+    def loaded(self, grip: float, closed: ContactSolution) -> Loaded:
+        """Apply the weight with the handle's height fixed, then lower the handle until it bears nothing."""
+        bare = self.bared(grip, closed)
+        if not bare.converged:
+            return Loaded(TrialOutcome.UNSOLVED, closed, (), float("nan"))
+        lowered = lower_object(
+            self.weight,
+            bare,
+            lambda after, height: self.moved(grip, after, height),
+            lambda after: self.released(grip, after),
+            predicted=self._predicted(grip),
+            rate=lambda after: self._sinking(grip, after),
+        )
+        self.lowered[grip] = lowered
+        instants = (*bare.instants, *lowered.instants)
+        return Loaded(lowered.outcome, lowered.solution, instants, lowered.borne)
 
     def held(self, grip: float) -> NDArray[np.int64]:
         """Prescribed degrees of freedom of the grip."""
@@ -116,6 +143,33 @@ class PrescribedTrials(WeightTrials):
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
         """Load share by the caller's function; 0 without contact."""
         return self._share(instant) if self._share is not None and instant.touches else (0.0, "")
+
+    def _sinking(self, grip: float, after: ContactSolution) -> float | None:
+        """Derivative of the weight share that the hand bears with respect to lowering the handle [1/m]; None if not
+        known."""
+        known = np.append(self.held(grip), 3 * self.weight.handle + self.weight.axis)
+        try:
+            tangent = EquilibriumTangent(self.body, self.pairs, after, known, steadied=True)
+            return self.weight.relief(tangent)
+        except SensitivityError:
+            return None
+
+    def rate(self, grip: float) -> float | None:
+        """Logarithmic derivative of the contact force between hand and object with respect to the grip, before the
+        weight acts; None if not known."""
+        closed = self.closed(grip)
+        if not (closed.converged and self.weight.force(closed.last) > 0.0):
+            return None
+        try:
+            return self.weight.rate(*self.tangent(grip, closed))
+        except SensitivityError:
+            return None
+
+    def _predicted(self, grip: float) -> float | None:
+        """Descent of the object at the nearest grip that held it [m]; None if none did."""
+        held = [one for one, lowered in self.lowered.items() if lowered.outcome is TrialOutcome.HELD]
+        near = min(held, key=lambda one: abs(one - grip), default=None)
+        return None if near is None else self.lowered[near].sunk
 
     def _at(self, grip: float, time: float) -> Prescribed:
         return self.prescribed(min(time, 1.0) * grip)

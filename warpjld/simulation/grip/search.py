@@ -30,6 +30,9 @@ _SAME = 0.02
 the search ends."""
 _AMPLE = 4.0
 """Ratio of available friction to weight above which more force would not help."""
+_FIRMER = 1.4
+"""Least ratio of capacities of a grip that does not hold and the next one, until one holds: what an object that turns
+or rolls out of a grip is short of is not known by its weight. Trials between the two follow."""
 _TRIALS = 24
 """Most grips tried; with slopes three or four are enough."""
 
@@ -187,7 +190,7 @@ class _Search:
 
     def __init__(self, hold: Callable[[float], Trial], bracket: Bracket, tolerance: float) -> None:
         self._hold, self._bracket, self._tolerance = hold, bracket, tolerance
-        self._aim = bracket.target
+        self._aim = self._needed = bracket.target
         self.trials: list[tuple[float, Trial]] = []
 
     def run(self, needed: float, most: int, exhausted: Callable[[], bool]) -> Grip:
@@ -236,12 +239,21 @@ class _Search:
         if trial.loaded and not any(one.loaded for _, one in self.trials[:-1]):
             self._bracket.distrust()  # earlier capacities are those before the weight acted
         if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # a capacity of 1 is not enough
-            self._bracket.target = self._aim * trial.able / trial.borne
+            self._needed = self._aim * trial.able / trial.borne
         self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
+        self._bracket.target = max(self._needed, self._firmer(trial))
+
+    def _firmer(self, trial: Trial) -> float:
+        """Least capacity to try next after an object turned or rolled out of a grip; 0 after other outcomes."""
+        rolls = any(one.outcome in (TrialOutcome.GIVES, TrialOutcome.SANK) for _, one in self.trials)
+        below, above = self._bracket.below, self._bracket.above
+        if not rolls or below is None or not below.value > 0.0:
+            return 0.0
+        return _FIRMER * below.value if above is None else float(np.sqrt(below.value * above.value))
 
     def _near(self, trial: Trial) -> bool:
         """Whether the capacity exceeds the target by no more than the tolerance."""
-        return trial.able <= self._bracket.target / self._aim * (1.0 + self._tolerance)
+        return trial.able <= self._needed / self._aim * (1.0 + self._tolerance)
 
     def _narrow(self) -> bool:
         """Whether the bracket is narrower than the tolerance."""

@@ -88,15 +88,23 @@ class Squeeze:
             return self._closed.get(grip) or self._failed[grip]
         before = max(known for known in self._closed if known <= grip + _SAME)
 
-        def moves(share: float) -> Moves:
-            return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self.time)
-
-        steps = self.hand.bones.steps([(self.angles(end), self.time) for end in (before, grip)], TRAVEL)
-        closing, most = (self.hand.name, moves), self.budget.left
+        steps, closing, most = self.steps(before, grip, TRAVEL), self.closes(before, grip), self.budget.left
         found = solve_branch(self.model, self.history, self._closed[before], steps, moves=closing, solves=most)
         self.budget.counted(found)
         (self._closed if found.converged else self._failed)[grip] = found
         return found
+
+    def closes(self, before: float, grip: float) -> tuple[str, Callable[[float], Moves]]:
+        """Bone motion of a branch on which the hand closes from one grip to another."""
+
+        def moves(share: float) -> Moves:
+            return self.hand.bones.moves_of(self.angles(before + share * (grip - before)), self.time)
+
+        return self.hand.name, moves
+
+    def steps(self, before: float, grip: float, travel: float) -> int:
+        """Number of steps between two grips in which no joint moves farther than ``travel`` [m]."""
+        return self.hand.bones.steps([(self.angles(end), self.time) for end in (before, grip)], travel)
 
     def tangent(self, grip: float, closed: ContactSolution) -> tuple[EquilibriumTangent, Perturbation]:
         """Tangent of the equilibrium at a grip, and the perturbation of the bones per rad of grip.

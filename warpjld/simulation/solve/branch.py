@@ -81,6 +81,7 @@ def solve_branch(
     moves: tuple[str, Callable[[float], Moves]] | None = None,
     known: tuple[str, Callable[[float], Prescribed]] | None = None,
     nodal: Callable[[float], NDArray[np.float64]] | None = None,
+    drag: NDArray[np.float64] | None = None,
     duration: float | None = None,
     halvings: int | None = None,
     solves: int | None = None,
@@ -95,6 +96,7 @@ def solve_branch(
         moves: Name of a hand, and the bone motions that replace those of the animation.
         known: Name of an object, and the Dirichlet conditions that replace its state variables and support.
         nodal: Additional nodal forces [N], shape (N, 3).
+        drag: Stiffness with which nodes resist motion since the start of each load step [N/m], shape (N,).
         duration: Duration of the branch [frames]; None: the animation stands still.
         halvings: Most halvings of a load step; a small number gives up early where there may be no equilibrium.
         solves: Most linear solves.
@@ -110,6 +112,8 @@ def solve_branch(
 
     def loads(time: float) -> Loads:
         here = model.loads_at(clock(time), history)
+        if drag is not None:
+            here = replace(here, drag=length / steps * drag)
         if nodal is None:
             return here
         return replace(here, nodal=nodal(share(time)) + (0.0 if here.nodal is None else here.nodal))

@@ -174,6 +174,8 @@ class ContactNewton:
         matrix = steadied(with_contact(lent, contact.points, blocks, threads=self.body.threads))
         if state.step.inertia is not None:
             matrix = state.step.inertia.added_to(matrix)
+        if (drag := state.step.dragged) is not None:
+            matrix = matrix.with_diagonal(drag)
         right = state.residual - matrix.product(state.jump, threads=self.body.threads)
         if contact.nonsymmetric is not None:
             right -= state.free * (contact.nonsymmetric @ state.jump)
@@ -217,9 +219,9 @@ class ContactNewton:
         return length
 
     def _unconstrained(self, step: LoadStep) -> UnconstrainedBodies:
-        """Bodies that nothing but contact holds; none with inertia, which resists every motion."""
+        """Bodies that nothing but contact holds; none with inertia or drag, which resist every motion."""
         known = step.prescribed
-        if step.inertia is not None:
+        if step.inertia is not None or step.loads.drag is not None:
             known = Prescribed(np.arange(self.body.degrees), np.zeros(self.body.degrees))
         key = known.degrees.tobytes()
         if self._free is None or self._free[0] != key:

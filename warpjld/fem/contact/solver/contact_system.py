@@ -55,7 +55,7 @@ class LoadStep:
         loads: Loads at ``time``.
         allowed: Fraction of the initial overlap that is still admissible at ``time``.
         inertia: Inertia in an implicit Euler step of that length; None: a quasi-static step.
-        held: Whether Dirichlet conditions, or inertia, resist every rigid motion of every body.
+        held: Whether Dirichlet conditions, inertia or a viscous medium resist every rigid motion of every body.
     """
 
     before: float
@@ -65,6 +65,11 @@ class LoadStep:
     allowed: float
     inertia: Inertia | None = None
     held: bool = False
+
+    @property
+    def dragged(self) -> Array | None:
+        """Stiffness with which a viscous medium resists motion since the start of the step [N/m], shape (N,)."""
+        return None if self.loads.drag is None else self.loads.drag / (self.time - self.before)
 
 
 @dataclass(frozen=True, eq=False)

@@ -135,7 +135,7 @@ class LoadSteps:
         now = known(time) if callable(known) else known.scaled(share)
         loads = self.loads(time) if callable(self.loads) else self.loads.scaled(share)
         inertia = self._inertia(before, time)
-        held = inertia is not None or not self.motion.leaves_free(now)
+        held = inertia is not None or loads.drag is not None or not self.motion.leaves_free(now)
         return LoadStep(before, time, now, loads, self.allowed(time), inertia, held)
 
     def _inertia(self, before: float, time: float) -> Inertia | None:

@@ -169,12 +169,14 @@ class NewtonState:
         return self.system.predicted(self.contact, self.states, move, self.step.allowed, self.predicts)
 
     def pull(self, u: Array) -> Array:
-        """External, inertial and minus internal forces of the bodies at displacement u, without contact [N], (3N,)."""
+        """External and minus internal forces of the bodies at displacement u, without contact [N], shape (3N,)."""
         return self._external(u) - self.elastic.forces(u).forces
 
     def _external(self, u: Array) -> Array:
-        """External and inertial forces at displacement u [N], shape (3N,)."""
+        """External, inertial and viscous forces at displacement u [N], shape (3N,)."""
         loads = self.elastic.external(self.step.loads, u)
+        if (drag := self.step.dragged) is not None:
+            loads = loads - np.repeat(drag, 3) * (u - self.start)
         return loads if self.step.inertia is None else loads + self.step.inertia.force(u)
 
     def left_over(self) -> float:
