@@ -9,8 +9,11 @@ from warpjld.covering import bind
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.approach_directions import free_ways
+from warpjld.grasp.close import Closer
+from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
+from warpjld.grasp.idle_fingers import idle_fingers_relaxed
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import make_object
@@ -68,6 +71,41 @@ def test_finding_a_grasp(covering) -> None:
     again = find_grasp(covering, thing, count=8, seed=1)
     np.testing.assert_array_equal(found.angles, again.angles)
     np.testing.assert_array_equal(found.position, again.position)
+
+
+def test_a_finger_that_misses_follows_the_one_beside_it(covering) -> None:
+    """The little finger would close into a fist beside the ball."""
+    thing, skeleton = ball(0.05), covering.skeleton
+    closer = Closer(covering, thing)
+    found = find_grasp(covering, thing, closer=closer, count=8, seed=0, posture="sphere")
+    assert "left.ring" in found.touching
+    assert "left.pinky" not in found.touching
+    chains = {digit: list(joints) for digit, joints in digit_chains(skeleton).items()}
+    little, ring = (found.angles[chains[f"left.{digit}"], FLEXION] for digit in ("pinky", "ring"))
+    assert (little <= ring + 1e-12).all()
+    assert found.penetration <= 6e-4
+    open_hand = poses_from_angles(
+        skeleton, found.start[None], root_position=found.position[None], root_rotation=found.rotation[None]
+    )
+    fist = closer.close(open_hand, found.start[None], coupling=(1.0, 0.7)).angles[0]
+    assert (fist[chains["left.pinky"], FLEXION] > ring + 0.1).all()
+    touching = [chains[digit] for digit in found.touching]
+    np.testing.assert_allclose(fist[np.concatenate(touching), FLEXION], found.angles[np.concatenate(touching), FLEXION])
+
+
+@pytest.mark.parametrize("touching", [["l.index", "l.thumb"], ["l.middle", "l.index"], ["l.thumb"], ["l.pinky"]])
+def test_idle_fingers_bend_no_more_than_the_nearest_that_touches(touching: list[str]) -> None:
+    digits = ["l.pinky", "l.ring", "l.middle", "l.index", "l.thumb"]
+    chains = {digit: (3 * k, 3 * k + 1, 3 * k + 2) for k, digit in enumerate(digits)}
+    angles = np.random.default_rng(3).uniform(0.0, 1.5, (15, 4))
+    found = idle_fingers_relaxed(angles, chains, touching)
+    beside = {"l.index": "l.index"} if "l.index" in touching else {}
+    nearest = {"l.pinky": touching[0], "l.ring": touching[0], "l.middle": touching[0], "l.index": touching[0]} | beside
+    for digit, joints in chains.items():
+        rows, free = list(joints), digit not in touching and digit != "l.thumb" and touching != ["l.thumb"]
+        other = angles[list(chains[nearest[digit]]), FLEXION] if free else np.inf
+        np.testing.assert_array_equal(found[rows, FLEXION], np.minimum(angles[rows, FLEXION], other))
+    np.testing.assert_array_equal(np.delete(found, FLEXION, axis=1), np.delete(angles, FLEXION, axis=1))
 
 
 def test_a_verdict_knows_which_contacts_press(covering) -> None:

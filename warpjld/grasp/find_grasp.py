@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, Closer
+from warpjld.grasp.digits import digit_chains
+from warpjld.grasp.idle_fingers import idle_fingers_relaxed
 from warpjld.grasp.judge import Judge, Verdict, check_friction, hand_side
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
@@ -28,6 +30,7 @@ _FINALISTS = 6  # placements of a round that are closed and judged in full
 _DEEPEST = 6e-4  # largest penetration of hand and object in a grasp that is accepted [m]
 _PRESSED = 3e-4  # penetration above which an open hand is moved back along its approach [m]
 _GOOD = 0.12  # score at which the search may end early [N]
+_AS_WELL = 0.95  # score over that before idle fingers open, above which the grasp counts as one that holds as well
 _OTHERS = ("plate", "cylinder", "sphere", "pinch")  # further postures, tried in turn while nothing is found
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # fractions of the closing motion at which collisions are tested
 
@@ -107,7 +110,8 @@ def find_grasp(
     become the best, digits are then also kept from passing through one another. A grasp that is not force closed, or
     has more than 0.6 mm of penetration, is refused; of the others the one with the best score is kept. The search ends
     after a round in which a grasp has a score of 0.12 N and uses all digits but one (all digits, for a pinch), or, with
-    any grasp, once half of the placements are tried.
+    any grasp, once half of the placements are tried. Fingers that touch nothing then open until they bend no more than
+    those beside them.
 
     Obstacles may be penetrated by 0.1 mm at most: by the open hand on the last 12 cm of its approach, and by the digits
     while they close. Placements that collide are drawn again.
@@ -192,7 +196,27 @@ def find_grasp(
             f"object {thing.name}: none of {tried} placements ends in a grasp that holds at friction {friction:g} "
             f"(postures {taken}){with_palm}: {fault_of(draws[first], friction)}{blocked}"
         )
-    return replace(best, tried=tried)
+    return replace(_at_ease(judge, closer, best, draws[best.posture].closing, side, around), tried=tried)
+
+
+def _at_ease(
+    judge: Judge, closer: Closer, best: AutoGrasp, closing: Sequence[str], side: str, around: Obstacles
+) -> AutoGrasp:
+    """The grasp with fingers that touch nothing bent no more than those beside them, if it holds as well."""
+    covering = closer.covering
+    chains = digit_chains(covering.skeleton, [f"{side}.{digit}" for digit in closing])
+    angles = idle_fingers_relaxed(best.angles, chains, best.touching)
+    if (angles == best.angles).all():
+        return best
+    hand = Candidates(best.position[None], best.rotation[None], best.approach[None], best.start[None])
+    there = closer.parted_at(hand.poses(covering.skeleton), hand.angles, angles[None], tuple(chains))
+    (verdict,) = _verdicts(judge, covering, hand, there)
+    kept = {name.removeprefix(f"{side}.") for name in best.touching} <= set(verdict.digits)
+    if not kept or verdict.depth > _DEEPEST or verdict.score < _AS_WELL * best.score:
+        return best
+    if around and _runs_into(covering, hand, there.angles, around):
+        return best
+    return replace(best, angles=there.angles[0], verdict=verdict)
 
 
 def _power(verdict: Verdict, digits: Sequence[str]) -> bool:
