@@ -27,6 +27,8 @@ from warpjld.grasp.widths import sample_widths
 from warpjld.skeleton import poses_from_angles
 from warpjld.skeleton.channels import FLEXION
 
+DIGITS = ["l.pinky", "l.ring", "l.middle", "l.index", "l.thumb"]
+
 
 def test_a_plate_is_not_held_as_a_glass() -> None:
     wanted = {plate: "plate", glass: "cylinder", ball: "sphere", cylinder: "cylinder"}
@@ -93,19 +95,33 @@ def test_a_finger_that_misses_follows_the_one_beside_it(covering) -> None:
     np.testing.assert_allclose(fist[np.concatenate(touching), FLEXION], found.angles[np.concatenate(touching), FLEXION])
 
 
+@pytest.mark.parametrize("closing", [["l.middle", "l.index", "l.thumb"], DIGITS])
 @pytest.mark.parametrize("touching", [["l.index", "l.thumb"], ["l.middle", "l.index"], ["l.thumb"], ["l.pinky"]])
-def test_idle_fingers_bend_no_more_than_the_nearest_that_touches(touching: list[str]) -> None:
-    digits = ["l.pinky", "l.ring", "l.middle", "l.index", "l.thumb"]
-    chains = {digit: (3 * k, 3 * k + 1, 3 * k + 2) for k, digit in enumerate(digits)}
+def test_idle_fingers_follow_the_nearest_that_touches(touching: list[str], closing: list[str]) -> None:
+    chains = {digit: (3 * k, 3 * k + 1, 3 * k + 2) for k, digit in enumerate(DIGITS)}
     angles = np.random.default_rng(3).uniform(0.0, 1.5, (15, 4))
-    found = idle_fingers_relaxed(angles, chains, touching)
-    beside = {"l.index": "l.index"} if "l.index" in touching else {}
-    nearest = {"l.pinky": touching[0], "l.ring": touching[0], "l.middle": touching[0], "l.index": touching[0]} | beside
+    found = idle_fingers_relaxed(angles, chains, touching, closing, 0.5)
     for digit, joints in chains.items():
-        rows, free = list(joints), digit not in touching and digit != "l.thumb" and touching != ["l.thumb"]
-        other = angles[list(chains[nearest[digit]]), FLEXION] if free else np.inf
-        np.testing.assert_array_equal(found[rows, FLEXION], np.minimum(angles[rows, FLEXION], other))
+        rows = list(joints)
+        expected = angles[rows, FLEXION]
+        if digit not in (*touching, "l.thumb") and touching != ["l.thumb"]:
+            # touching fingers are listed from the middle one on: the first is nearest to all but the index finger
+            other = angles[list(chains[touching[0]]), FLEXION]
+            follows = digit in closing
+            expected = np.minimum(expected, other) if follows else np.maximum(expected, 0.5 * other)
+        np.testing.assert_array_equal(found[rows, FLEXION], expected)
     np.testing.assert_array_equal(np.delete(found, FLEXION, axis=1), np.delete(angles, FLEXION, axis=1))
+
+
+def test_fingers_that_take_no_part_in_a_pinch_are_not_straight(covering) -> None:
+    found = find_grasp(covering, ball(0.04), count=16, seed=0, posture="pinch")
+    assert not {"left.ring", "left.pinky"} & set(found.touching)
+    chains = digit_chains(covering.skeleton)
+    middle, ring, pinky = (found.angles[list(chains[f"left.{d}"]), FLEXION] for d in ("middle", "ring", "pinky"))
+    np.testing.assert_allclose(ring, 0.5 * middle)
+    np.testing.assert_allclose(pinky, 0.5 * middle)
+    assert (middle[:2] > 0.2).all()
+    assert found.penetration <= 6e-4
 
 
 def test_a_verdict_knows_which_contacts_press(covering) -> None:

@@ -22,6 +22,7 @@ from warpjld.grasp.postures import posture_for
 from warpjld.grasp.random_placements import Draws
 from warpjld.grasp.refusal import fault_of, refuse_what_is_too_wide
 from warpjld.skeleton import Poses, Skeleton
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["AutoGrasp", "find_grasp"]
 
@@ -31,6 +32,7 @@ _DEEPEST = 6e-4  # largest penetration of hand and object in a grasp that is acc
 _PRESSED = 3e-4  # penetration above which an open hand is moved back along its approach [m]
 _GOOD = 0.12  # score at which the search may end early [N]
 _AS_WELL = 0.95  # score over that before idle fingers open, above which the grasp counts as one that holds as well
+_FOLLOWS = (0.5, 0.25, 0.0)  # flexion of a finger that takes no part, over that of the finger beside it, tried in turn
 _OTHERS = ("plate", "cylinder", "sphere", "pinch")  # further postures, tried in turn while nothing is found
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # fractions of the closing motion at which collisions are tested
 
@@ -110,8 +112,7 @@ def find_grasp(
     become the best, digits are then also kept from passing through one another. A grasp that is not force closed, or
     has more than 0.6 mm of penetration, is refused; of the others the one with the best score is kept. The search ends
     after a round in which a grasp has a score of 0.12 N and uses all digits but one (all digits, for a pinch), or, with
-    any grasp, once half of the placements are tried. Fingers that touch nothing then open until they bend no more than
-    those beside them.
+    any grasp, once half of the placements are tried. Fingers that touch nothing are then bent by those beside them.
 
     Obstacles may be penetrated by 0.1 mm at most: by the open hand on the last 12 cm of its approach, and by the digits
     while they close. Placements that collide are drawn again.
@@ -202,21 +203,24 @@ def find_grasp(
 def _at_ease(
     judge: Judge, closer: Closer, best: AutoGrasp, closing: Sequence[str], side: str, around: Obstacles
 ) -> AutoGrasp:
-    """The grasp with fingers that touch nothing bent no more than those beside them, if it holds as well."""
+    """The grasp with fingers that touch nothing bent by those beside them, if it holds as well."""
     covering = closer.covering
-    chains = digit_chains(covering.skeleton, [f"{side}.{digit}" for digit in closing])
-    angles = idle_fingers_relaxed(best.angles, chains, best.touching)
-    if (angles == best.angles).all():
-        return best
+    chains = {name: joints for name, joints in digit_chains(covering.skeleton).items() if name.startswith(f"{side}.")}
+    taking, touching = [f"{side}.{digit}" for digit in closing], {name.partition(".")[2] for name in best.touching}
     hand = Candidates(best.position[None], best.rotation[None], best.approach[None], best.start[None])
-    there = closer.parted_at(hand.poses(covering.skeleton), hand.angles, angles[None], tuple(chains))
-    (verdict,) = _verdicts(judge, covering, hand, there)
-    kept = {name.removeprefix(f"{side}.") for name in best.touching} <= set(verdict.digits)
-    if not kept or verdict.depth > _DEEPEST or verdict.score < _AS_WELL * best.score:
-        return best
-    if around and _runs_into(covering, hand, there.angles, around):
-        return best
-    return replace(best, angles=there.angles[0], verdict=verdict)
+    most = covering.skeleton.limits[:, FLEXION, 1]
+    for share in _FOLLOWS:
+        angles = idle_fingers_relaxed(best.angles, chains, best.touching, taking, share)
+        angles[:, FLEXION] = np.minimum(angles[:, FLEXION], np.maximum(most, best.angles[:, FLEXION]))
+        if (angles == best.angles).all():
+            break
+        there = closer.parted_at(hand.poses(covering.skeleton), hand.angles, angles[None], tuple(chains))
+        (verdict,) = _verdicts(judge, covering, hand, there)
+        holds = touching <= set(verdict.digits) and verdict.score >= _AS_WELL * best.score
+        clear = verdict.depth <= _DEEPEST and not (around and _runs_into(covering, hand, there.angles, around))
+        if holds and clear:
+            return replace(best, angles=there.angles[0], verdict=verdict)
+    return best
 
 
 def _power(verdict: Verdict, digits: Sequence[str]) -> bool:

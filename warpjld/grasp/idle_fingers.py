@@ -1,8 +1,8 @@
-"""Fingers of a grasp that touch nothing bend no more than the finger beside them that does.
+"""Fingers of a grasp that touch nothing follow the finger beside them that does.
 
-A finger that misses the object would close into a fist beside it. Fingers of people do not: their flexors move
-neighbours along (enslaving; Zatsiorsky, Li and Latash 2000, Exp Brain Res 131: 187–195), and a finger without a task
-follows the one beside it.
+A finger that misses the object would close into a fist beside it, and one that takes no part in a posture would stay
+straight. Fingers of people do neither: their flexors move neighbours along (enslaving; Zatsiorsky, Li and Latash 2000,
+Exp Brain Res 131: 187–195), and a finger without a task follows the one beside it.
 """
 
 from __future__ import annotations
@@ -20,14 +20,23 @@ _FINGERS = ("index", "middle", "ring", "pinky")
 
 
 def idle_fingers_relaxed(
-    angles: NDArray[np.float64], chains: Mapping[str, tuple[int, ...]], touching: Collection[str]
+    angles: NDArray[np.float64],
+    chains: Mapping[str, tuple[int, ...]],
+    touching: Collection[str],
+    closing: Collection[str],
+    share: float,
 ) -> NDArray[np.float64]:
-    """Joint angles with no joint of an idle finger flexed farther than that of the nearest finger that touches.
+    """Joint angles with idle fingers bent by the nearest finger that touches.
+
+    No joint of an idle finger that closes is flexed farther than that of the other finger; those of one that takes no
+    part are flexed by a share of it, if that is farther than they are.
 
     Args:
         angles: Angles of a closed hand [rad], shape (J, 4).
         chains: Joints of its digits, base first, see ``digit_chains``.
         touching: Names of the digits that touch.
+        closing: Names of the digits that take part.
+        share: Flexion of one that does not, over that of the finger beside it.
 
     Returns:
         Angles [rad], shape (J, 4); as given where no finger touches.
@@ -40,5 +49,6 @@ def idle_fingers_relaxed(
             break
         beside = min(busy, key=lambda other: (abs(place[other] - place[name]), place[other]))
         mine, theirs = list(chains[name]), list(chains[beside])
-        out[mine, FLEXION] = np.minimum(angles[mine, FLEXION], angles[theirs, FLEXION])
+        own, other = angles[mine, FLEXION], angles[theirs, FLEXION]
+        out[mine, FLEXION] = np.minimum(own, other) if name in closing else np.maximum(own, share * other)
     return out

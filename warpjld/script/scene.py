@@ -117,6 +117,7 @@ class Scene:
         attempts: Results of searches and grasps, for the summary.
         contact: Specification of the contact simulation.
         grips: Angles of an actor's digits before GRASP closed them, by actor and channel [rad].
+        idle: Channels of those digits that GRASP … AUTO bent although they take no part, by actor; they do not tighten.
         current: Name of the actor that commands without an actor or side apply to.
         first, last: Frames to compute, both included; None: from the first key to the last.
         rate: Frames per second.
@@ -153,6 +154,7 @@ class Scene:
     attempts: list[Attempt] = field(default_factory=list)
     contact: ContactSpecification = field(default_factory=ContactSpecification)
     grips: dict[str, dict[str, float]] = field(default_factory=dict)
+    idle: dict[str, set[str]] = field(default_factory=dict)
     current: str | None = None
     first: int | None = None
     last: int | None = None
