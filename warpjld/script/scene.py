@@ -117,7 +117,6 @@ class Scene:
         attempts: Results of searches and grasps, for the summary.
         contact: Specification of the contact simulation.
         grips: Angles of an actor's digits before GRASP closed them, by actor and channel [rad].
-        idle: Channels of those digits that GRASP … AUTO bent although they take no part, by actor; they do not tighten.
         current: Name of the actor that commands without an actor or side apply to.
         first, last: Frames to compute, both included; None: from the first key to the last.
         rate: Frames per second.
@@ -138,6 +137,7 @@ class Scene:
         warn: Function that receives warnings about rigs and motions; ``warnings`` keeps them for the summary.
         warnings: Warnings so far.
         device: Warp device of searches.
+        idle: Channels of fingers that GRASP … AUTO bent although they take no part, by actor; they do not tighten.
 
     Examples:
         >>> from warpjld.script import Interpreter
@@ -154,7 +154,6 @@ class Scene:
     attempts: list[Attempt] = field(default_factory=list)
     contact: ContactSpecification = field(default_factory=ContactSpecification)
     grips: dict[str, dict[str, float]] = field(default_factory=dict)
-    idle: dict[str, set[str]] = field(default_factory=dict)
     current: str | None = None
     first: int | None = None
     last: int | None = None
@@ -176,6 +175,7 @@ class Scene:
     warn: Callable[[str], None] = _to_stderr
     warnings: list[str] = field(default_factory=list)
     device: str = "cpu"
+    idle: dict[str, set[str]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         counts = ((len(self.actors), "actor"), (len(self.props), "object"))
