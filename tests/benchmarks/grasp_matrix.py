@@ -113,7 +113,7 @@ def lines(hand: str, thing: str, task: str, arguments: argparse.Namespace) -> st
     script = [HANDS[hand], f"OBJECT THING {OBJECTS[name]} AT 0 0 0", f"FRAMES 0 {LAST}", "SPLINE 1"]
     if physical:
         script += [f"PHYSICAL THING YOUNG {YOUNG[physical]:g} DENSITY 300 ELEMENT {1.5 * arguments.coarse:g}"]
-    script += [f"GRASP 0 24 {side} THING AUTO TRIES 8"]
+    script += [f"GRASP 0 24 {side} THING AUTO"]
     script += {
         "squeeze": [f"SQUEEZE 24 {LAST} {side} 3"],
         "force": [f"SQUEEZE 24 {LAST} {side} FORCE 4"],

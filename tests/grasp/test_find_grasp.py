@@ -9,8 +9,11 @@ from warpjld.covering import bind
 from warpjld.errors import InputError
 from warpjld.grasp import ObjectSet
 from warpjld.grasp.approach_directions import free_ways
+from warpjld.grasp.close import Closer
+from warpjld.grasp.digits import digit_chains
 from warpjld.grasp.find_grasp import find_grasp
 from warpjld.grasp.hand_object_gaps import HandObjectGaps
+from warpjld.grasp.idle_fingers import idle_fingers_relaxed
 from warpjld.grasp.judge import Judge
 from warpjld.grasp.near_object import NearObject
 from warpjld.grasp.objects import make_object
@@ -23,6 +26,8 @@ from warpjld.grasp.shapes import ball, box, cylinder, glass, plate
 from warpjld.grasp.widths import sample_widths
 from warpjld.skeleton import poses_from_angles
 from warpjld.skeleton.channels import FLEXION
+
+DIGITS = ["l.pinky", "l.ring", "l.middle", "l.index", "l.thumb"]
 
 
 def test_a_plate_is_not_held_as_a_glass() -> None:
@@ -68,6 +73,55 @@ def test_finding_a_grasp(covering) -> None:
     again = find_grasp(covering, thing, count=8, seed=1)
     np.testing.assert_array_equal(found.angles, again.angles)
     np.testing.assert_array_equal(found.position, again.position)
+
+
+def test_a_finger_that_misses_follows_the_one_beside_it(covering) -> None:
+    """The little finger would close into a fist beside the ball."""
+    thing, skeleton = ball(0.05), covering.skeleton
+    closer = Closer(covering, thing)
+    found = find_grasp(covering, thing, closer=closer, count=8, seed=0, posture="sphere")
+    assert "left.ring" in found.touching
+    assert "left.pinky" not in found.touching
+    chains = {digit: list(joints) for digit, joints in digit_chains(skeleton).items()}
+    little, ring = (found.angles[chains[f"left.{digit}"], FLEXION] for digit in ("pinky", "ring"))
+    assert (little <= ring + 1e-12).all()
+    assert found.penetration <= 6e-4
+    open_hand = poses_from_angles(
+        skeleton, found.start[None], root_position=found.position[None], root_rotation=found.rotation[None]
+    )
+    fist = closer.close(open_hand, found.start[None], coupling=(1.0, 0.7)).angles[0]
+    assert (fist[chains["left.pinky"], FLEXION] > ring + 0.1).all()
+    touching = [chains[digit] for digit in found.touching]
+    np.testing.assert_allclose(fist[np.concatenate(touching), FLEXION], found.angles[np.concatenate(touching), FLEXION])
+
+
+@pytest.mark.parametrize("closing", [["l.middle", "l.index", "l.thumb"], DIGITS])
+@pytest.mark.parametrize("touching", [["l.index", "l.thumb"], ["l.middle", "l.index"], ["l.thumb"], ["l.pinky"]])
+def test_idle_fingers_follow_the_nearest_that_touches(touching: list[str], closing: list[str]) -> None:
+    chains = {digit: (3 * k, 3 * k + 1, 3 * k + 2) for k, digit in enumerate(DIGITS)}
+    angles = np.random.default_rng(3).uniform(0.0, 1.5, (15, 4))
+    found = idle_fingers_relaxed(angles, chains, touching, closing, 0.5)
+    for digit, joints in chains.items():
+        rows = list(joints)
+        expected = angles[rows, FLEXION]
+        if digit not in (*touching, "l.thumb") and touching != ["l.thumb"]:
+            # touching fingers are listed from the middle one on: the first is nearest to all but the index finger
+            other = angles[list(chains[touching[0]]), FLEXION]
+            follows = digit in closing
+            expected = np.minimum(expected, other) if follows else np.maximum(expected, 0.5 * other)
+        np.testing.assert_array_equal(found[rows, FLEXION], expected)
+    np.testing.assert_array_equal(np.delete(found, FLEXION, axis=1), np.delete(angles, FLEXION, axis=1))
+
+
+def test_fingers_that_take_no_part_in_a_pinch_are_not_straight(covering) -> None:
+    found = find_grasp(covering, ball(0.04), count=16, seed=0, posture="pinch")
+    assert not {"left.ring", "left.pinky"} & set(found.touching)
+    chains = digit_chains(covering.skeleton)
+    middle, ring, pinky = (found.angles[list(chains[f"left.{d}"]), FLEXION] for d in ("middle", "ring", "pinky"))
+    np.testing.assert_allclose(ring, 0.5 * middle)
+    np.testing.assert_allclose(pinky, 0.5 * middle)
+    assert (middle[:2] > 0.2).all()
+    assert found.penetration <= 6e-4
 
 
 def test_a_verdict_knows_which_contacts_press(covering) -> None:

@@ -52,6 +52,34 @@ def test_ticks_are_round_as_written(low: float, high: float, factor: float, text
     assert ticks[-1] <= high
 
 
+@pytest.mark.parametrize("high", [37.0, 10_200.0, 281_400.0, 2e7])
+def test_ticks_of_pressure_are_round_and_apart(high: float) -> None:
+    scale = ColorScale.of_pressure(high)
+    ticks = scale.ticks(0.065)
+    assert ticks[0] == 0.0
+    assert ticks[-1] == high
+    assert 6 <= len(ticks) <= 10
+    assert np.diff(scale.shares(ticks)).min() >= 0.065
+    assert all(f"{tick:.0e}"[0] in "125" for tick in ticks[1:-1])
+    np.testing.assert_allclose([float(f"{tick:.0e}") for tick in ticks[1:-1]], ticks[1:-1])
+    assert ticks[1] <= 0.02 * high
+
+
+@pytest.mark.parametrize("share", [0.01, 0.02])
+def test_a_digit_beside_one_pressed_a_hundred_times_as_much_is_seen(share: float) -> None:
+    """Its colour differs from that of no pressure by more than skin's shading does; linearly it does not."""
+    scale = ColorScale.of_pressure(3e5)
+    none, slight = scale.colors(np.array([0.0, share * 3e5])).astype(float)
+    assert np.abs(slight - none).max() > 40.0
+    plain = ColorScale(0.0, 3e5, colormap=scale.colormap).colors(np.array([0.0, share * 3e5])).astype(float)
+    assert np.abs(plain[1] - plain[0]).max() < 12.0
+
+
+def test_no_pressure_has_a_scale() -> None:
+    scale = ColorScale.of_pressure(0.0)
+    np.testing.assert_array_equal(scale.colors(np.array([0.0, -1.0])), scale.table()[[0, 0]])
+
+
 @pytest.mark.parametrize("name", ["LightBlue", "light blue", "#ADD8E6", "#add8e6"])
 def test_colours_by_name_and_number(name: str) -> None:
     assert as_hex(name) == "#add8e6"

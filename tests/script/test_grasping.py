@@ -189,6 +189,19 @@ def test_wrong_lines(run, line: str, says: str) -> None:
         run(line)
 
 
+def test_fingers_that_take_no_part_bend_with_the_grasp_and_do_not_tighten(run) -> None:
+    scene = run(
+        "OBJECT bead BALL 0.04 AT 0.5 0 0\nGRASP 5 15 LEFT bead AUTO TRIES 16 POSTURE PINCH\nSQUEEZE 15 20 LEFT 3\n"
+        "RELEASE 25 30 LEFT"
+    )
+    for joint in ("ring.base", "ring.knuckle2", "pinky.base"):
+        assert flexion(scene, joint, 15) > 5
+        assert flexion(scene, joint, 20) == pytest.approx(flexion(scene, joint, 15))
+        assert flexion(scene, joint, 30) == pytest.approx(flexion(scene, joint, 5))
+    for joint in ("index.base", "middle.base"):
+        assert flexion(scene, joint, 20) == pytest.approx(flexion(scene, joint, 15) + 3)
+
+
 def test_grasp_auto(run) -> None:
     scene = run("OBJECT apple BALL 0.06 AT 0.5 0 0\nGRASP 5 15 LEFT apple AUTO TRIES 8\nRELEASE 20 30 LEFT")
     attempt = scene.attempts[0]

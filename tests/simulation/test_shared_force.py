@@ -70,6 +70,28 @@ def test_first_touches_do_not_decide() -> None:
     assert len(found.trials) <= 12
 
 
+def test_a_digit_goes_to_where_it_should_touch_at_once() -> None:
+    """Solving contact at every step on the way is what takes longest."""
+    touch = np.radians([0.0, 0.0, 0.0, 0.0, 17.0])
+    found, blind = (shared(pads(touch), 12.5, **more) for more in ({"touch": touch}, {}))  # type: ignore[arg-type]
+    assert found.status is blind.status is ForceStatus.REACHED
+    np.testing.assert_allclose(found.pressed.forces / 12.5, STRENGTHS / STRENGTHS.sum(), rtol=0.08)  # type: ignore[union-attr]
+    assert len(found.trials) <= len(blind.trials) - 2
+    ways = np.array([at[4] for at, _ in found.trials])
+    assert not ((ways > 0.0) & (ways < touch[4])).any()
+
+
+def test_a_digit_that_passes_by_is_left_out() -> None:
+    """The last one should touch after 2 degrees, and presses on nothing however far it closes."""
+    touch = np.radians([0.0, 0.0, 0.0, 0.0, 2.0])
+    found = shared(pads(np.array([-3e-3, -1e-3, -2e-3, -4e-3, 9.0])), 20.0, touch=touch)  # type: ignore[arg-type]
+    assert found.status is ForceStatus.REACHED
+    assert found.left_out == (4,)
+    assert max(at[4] for at, _ in found.trials) < 0.2  # of 0.4 rad of room
+    rest = np.delete(found.pressed.forces, 4)  # type: ignore[union-attr]
+    np.testing.assert_allclose(rest / 20.0, STRENGTHS[:4] / STRENGTHS[:4].sum(), rtol=0.08)
+
+
 def test_levers_decide_not_forces() -> None:
     """Two digits of one strength; the object lies half as far from the joints of the second, which presses twice as
     hard with the same share."""

@@ -141,10 +141,27 @@ class Closer:
             poses: The open hands, as given to ``close``; likewise ``angles`` and ``places``.
             closed: What ``close`` returned for them.
         """
+        return self._parted_at(poses, angles, closed.angles, closed.digits, closed.status.copy(), places)
+
+    def parted_at(
+        self, poses: Poses, angles: NDArray[np.float64], wanted: NDArray[np.float64], digits: tuple[str, ...]
+    ) -> Closed:
+        """As ``parted``, of hands that close from ``angles`` to ``wanted`` [rad], each (G, J, 4), without a search."""
+        status = np.full((len(poses), len(digits), 3), int(SearchStatus.CONVERGED), dtype=np.int32)
+        return self._parted_at(poses, angles, wanted, digits, status, None)
+
+    def _parted_at(
+        self,
+        poses: Poses,
+        angles: NDArray[np.float64],
+        wanted: NDArray[np.float64],
+        digits: tuple[str, ...],
+        status: NDArray[np.int32],
+        places: Places | None,
+    ) -> Closed:
         where = self._places(places, len(poses))
         hands = self._hands(poses, angles, where, every=1, tolerance=0.0)
-        chains = digit_chains(self.covering.skeleton, closed.digits)
-        return self._parted(hands, angles, closed.angles, closed.status.copy(), chains, where)
+        return self._parted(hands, angles, wanted, status, digit_chains(self.covering.skeleton, digits), where)
 
     def _places(self, places: Places | None, count: int) -> Places:
         where = self.thing.place if places is None else places

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from warpjld.covering import Covering
 from warpjld.errors import InputError
 from warpjld.grasp.close import Closed, Closer
+from warpjld.grasp.digits import digit_chains
+from warpjld.grasp.idle_fingers import idle_fingers_relaxed
 from warpjld.grasp.judge import Judge, Verdict, check_friction, hand_side
 from warpjld.grasp.objects import GraspObject
 from warpjld.grasp.obstacles import COLLIDES, Obstacles
@@ -20,6 +22,7 @@ from warpjld.grasp.postures import posture_for
 from warpjld.grasp.random_placements import Draws
 from warpjld.grasp.refusal import fault_of, refuse_what_is_too_wide
 from warpjld.skeleton import Poses, Skeleton
+from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["AutoGrasp", "check_opposing", "find_grasp"]
 
@@ -28,6 +31,8 @@ _FINALISTS = 6  # placements of a round that are closed and judged in full
 _DEEPEST = 6e-4  # largest penetration of hand and object in a grasp that is accepted [m]
 _PRESSED = 3e-4  # penetration above which an open hand is moved back along its approach [m]
 _GOOD = 0.12  # score at which the search may end early [N]
+_AS_WELL = 0.95  # score over that before idle fingers open, above which the grasp counts as one that holds as well
+_FOLLOWS = (0.5, 0.25, 0.0)  # flexion of a finger that takes no part, over that of the finger beside it, tried in turn
 _OTHERS = ("plate", "cylinder", "sphere", "pinch")  # further postures, tried in turn while nothing is found
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # fractions of the closing motion at which collisions are tested
 
@@ -108,7 +113,7 @@ def find_grasp(
     become the best, digits are then also kept from passing through one another. A grasp that is not force closed, or
     has more than 0.6 mm of penetration, is refused; of the others the one with the best score is kept. The search ends
     after a round in which a grasp has a score of 0.12 N and uses all digits but one (all digits, for a pinch), or, with
-    any grasp, once half of the placements are tried.
+    any grasp, once half of the placements are tried. Fingers that touch nothing are then bent by those beside them.
 
     Obstacles may be penetrated by 0.1 mm at most: by the open hand on the last 12 cm of its approach, and by the digits
     while they close. Placements that collide are drawn again.
@@ -194,7 +199,30 @@ def find_grasp(
     if best is None:
         taken = dict.fromkeys(kinds[: -(-count // _ROUND)])
         raise InputError(_no_grasp(thing, draws, first, taken, around, tried, friction, palm))
-    return replace(best, tried=tried)
+    return replace(_at_ease(judge, closer, best, draws[best.posture].closing, side, around), tried=tried)
+
+
+def _at_ease(
+    judge: Judge, closer: Closer, best: AutoGrasp, closing: Sequence[str], side: str, around: Obstacles
+) -> AutoGrasp:
+    """The grasp with fingers that touch nothing bent by those beside them, if it holds as well."""
+    covering = closer.covering
+    chains = {name: joints for name, joints in digit_chains(covering.skeleton).items() if name.startswith(f"{side}.")}
+    taking, touching = [f"{side}.{digit}" for digit in closing], {name.partition(".")[2] for name in best.touching}
+    hand = Candidates(best.position[None], best.rotation[None], best.approach[None], best.start[None])
+    most = covering.skeleton.limits[:, FLEXION, 1]
+    for share in _FOLLOWS:
+        angles = idle_fingers_relaxed(best.angles, chains, best.touching, taking, share)
+        angles[:, FLEXION] = np.minimum(angles[:, FLEXION], np.maximum(most, best.angles[:, FLEXION]))
+        if (angles == best.angles).all():
+            break
+        there = closer.parted_at(hand.poses(covering.skeleton), hand.angles, angles[None], tuple(chains))
+        (verdict,) = _verdicts(judge, covering, hand, there)
+        holds = touching <= set(verdict.digits) and verdict.score >= _AS_WELL * best.score
+        clear = verdict.depth <= _DEEPEST and not (around and _runs_into(covering, hand, there.angles, around))
+        if holds and clear:
+            return replace(best, angles=there.angles[0], verdict=verdict)
+    return best
 
 
 def _no_grasp(

@@ -13,6 +13,15 @@ from warpjld.suggest import did_you_mean
 
 __all__ = ["ColorScale", "as_hex"]
 
+_PRESSURE = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
+_NOTHING = 1.0
+"""Least upper end of a scale of pressures [Pa], where there is none."""
+_APART, _DECADES = 0.08, 4
+"""Least distance of numbers beside a scale with a power, over its length; decades below the highest that are tried."""
+_ROOT = 0.5
+"""Exponent of a scale of pressures: a digit pressed with a hundredth of the highest pressure is a tenth up the scale,
+which can be told from none; linearly it is as good as none."""
+
 
 def as_hex(color: str) -> str:
     """A colour as ``#rrggbb``, from a CSS name in any case, or ``#rgb``, ``#rrggbb``.
@@ -42,6 +51,7 @@ class ColorScale:
         colormap: Name of a Matplotlib colour map, or colours to interpolate between.
         factor: Factor of the numbers on the bar, e.g. 1000 for metres shown in mm.
         highest: Whether ``high`` is written on the bar even if it is not a round number.
+        power: Exponent of the position between the limits; below 1 it spreads small numbers.
     """
 
     low: float
@@ -50,10 +60,13 @@ class ColorScale:
     colormap: str | tuple[str, ...] = "viridis"
     factor: float = 1.0
     highest: bool = False
+    power: float = 1.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite([self.low, self.high]).all() and self.low < self.high):
             raise InputError(f"colour scale: want low < high, got {self.low} and {self.high}")
+        if not self.power > 0.0:
+            raise InputError(f"colour scale: want a power above 0, got {self.power}")
 
     @classmethod
     def spanning(cls, values: ArrayLike, *, title: str = "", colormap: str = "viridis", factor: float = 1.0) -> Self:
@@ -70,13 +83,20 @@ class ColorScale:
             low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
         return cls(low, high, title, colormap, factor)
 
+    @classmethod
+    def of_pressure(cls, high: float) -> Self:
+        """The scale of contact pressures from 0 to ``high`` [Pa], on which every digit that presses is seen."""
+        title = "contact pressure, kPa"
+        return cls(0.0, max(_NOTHING, high), title, _PRESSURE, factor=1e-3, highest=True, power=_ROOT)
+
     def colors(self, values: NDArray[np.floating]) -> NDArray[np.uint8]:
         """Colours, shape (n, 3), of numbers (n,)."""
         return self.table()[np.rint(np.clip(self.shares(values), 0, 1) * 255).astype(int)]
 
     def shares(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
         """Position of numbers (n,) between ``low`` (0) and ``high`` (1), shape (n,)."""
-        return np.asarray((values - self.low) / (self.high - self.low), np.float64)
+        out = np.asarray((values - self.low) / (self.high - self.low), np.float64)
+        return out if self.power == 1.0 else np.asarray(np.maximum(out, 0.0) ** self.power)
 
     def drawn_on(self, picture: NDArray[np.uint8], ink: str) -> NDArray[np.uint8]:
         """The picture with a colour bar, its numbers and the title at the right border."""
@@ -89,22 +109,27 @@ class ColorScale:
         bar_width, bar_height = max(8, round(0.7 * size)), round(0.5 * height)
         left, top = width - bar_width - round(4.2 * size), round(0.25 * height)
         canvas = Image.fromarray(picture.copy())
-        ramp = self.colors(np.linspace(self.high, self.low, bar_height))
+        ramp = self.table()[np.rint(np.linspace(255, 0, bar_height)).astype(int)]
         canvas.paste(Image.fromarray(np.repeat(ramp[:, None], bar_width, axis=1)), (left, top))
         for number in self.ticks(apart=1.3 * size / bar_height):
-            y = top + bar_height * (1 - (number - self.low) / (self.high - self.low))
-            text = f"{number * self.factor:.3g}"  # with a hyphen, since the built-in font has no minus sign
+            y = top + bar_height * (1.0 - float(self.shares(np.array([number]))[0]))
+            shown = number * self.factor
+            text = f"{shown:.3g}" if abs(shown) < 1e3 else f"{shown:.0f}"  # the built-in font has no minus sign
             write(canvas, (left + bar_width + 0.5 * size, y), text, size=size, color=ink, anchor="lm")
         if self.title:
             write(canvas, (width - 0.8 * size, top - 1.4 * size), self.title, size=size, color=ink, anchor="rm")
         return np.asarray(canvas)
 
     def ticks(self, apart: float = 0.0) -> NDArray[np.float64]:
-        """Numbers to write beside the bar: four to eight round ones; with ``highest`` also ``high``.
+        """Numbers to write beside the bar: four to eight round ones; with ``highest`` also ``high``. With a power, 1, 2
+        and 5 times powers of ten above ``low``, as many as there is room for.
 
         Args:
-            apart: Share of the bar within which other numbers near ``high`` are left out then.
+            apart: Share of the bar within which other numbers near ``high`` are left out then; with a power, least
+                distance of any two.
         """
+        if self.power != 1.0:
+            return self._spread_ticks(max(apart, _APART))
         low, high = sorted((self.low * self.factor, self.high * self.factor))
         rough = (high - low) / 7.0
         power = 10.0 ** np.floor(np.log10(rough))
@@ -114,6 +139,18 @@ class ColorScale:
         if self.highest:
             numbers = np.append(numbers[self.shares(numbers) < 1.0 - max(apart, 1e-9)], self.high)
         return np.asarray(numbers)
+
+    def _spread_ticks(self, apart: float) -> NDArray[np.float64]:
+        """Ticks of a scale with a power, at least ``apart`` of the bar from one another; the higher ones first."""
+        span = self.high - self.low
+        top = int(np.floor(np.log10(span * self.factor)))
+        rounds = [n * 10.0**power / self.factor for power in range(top, top - _DECADES, -1) for n in (5.0, 2.0, 1.0)]
+        kept = [span] if self.highest else []
+        for number in (number for number in rounds if number <= span):
+            at = self.shares(self.low + np.array([number, 0.0, *kept]))
+            if np.abs(at[1:] - at[0]).min() >= apart:
+                kept.append(number)
+        return np.asarray(self.low + np.array([0.0, *kept[::-1]]))
 
     def table(self) -> NDArray[np.uint8]:
         """The colours from ``low`` to ``high``, shape (256, 3)."""

@@ -92,6 +92,7 @@ def grasp_by_itself(
 
 def key_grip(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:
     """Set keys of the joints: open at the first two frames, closed at the last; RELEASE opens them again."""
+    from warpjld.grasp.postures import CLOSING
     from warpjld.skeleton import CHANNELS
 
     first, middle, last = frames
@@ -105,6 +106,9 @@ def key_grip(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, 
         actor.set_keys(channel, [first, middle], start, scene.spline)
         actor.set_keys(channel, [last], closed, scene.spline)
     scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+    closing = CLOSING.get(found.posture)
+    idle = {channel for channel in grip if closing is not None and channel.split(".")[-3] not in closing}
+    scene.idle[actor.name] = (scene.idle.get(actor.name, set()) - grip.keys()) | idle
 
 
 def carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, float, float]) -> None:

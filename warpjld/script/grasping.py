@@ -155,6 +155,7 @@ def close_digits(
             actor.set_keys(channel, [first], before, scene.spline)
             actor.set_keys(channel, [last], float(closed.angles[0, joint, 0]), scene.spline)
     scene.grips[actor.name] = scene.grips.get(actor.name, {}) | grip
+    scene.idle[actor.name] = scene.idle.get(actor.name, set()) - grip.keys()
     poses, _ = posture(scene, actor, last)
     inside = intersection(covering, covering.deform(poses)[0], thing)
     touching = closed.touching()[0]

@@ -62,14 +62,14 @@ def gripping_actor(scene: Scene, arguments: Arguments) -> Actor:
     return actor
 
 
-def flexions_of_grip(
-    actor: Actor, grip: dict[str, float], frame: float
-) -> Iterator[tuple[str, float, tuple[float, float]]]:
+def flexions_of_grip(scene: Scene, actor: Actor, frame: float) -> Iterator[tuple[str, float, tuple[float, float]]]:
     """Flexions that tighten a grip: channel, value at a frame, and limits [rad].
 
-    Second and third joints that GRASP did not flex are left out: the digit touches nearer to its base.
+    Second and third joints that GRASP did not flex are left out: the digit touches nearer to its base; likewise
+    fingers that take no part in it.
     """
-    for channel in grip:
+    idle = scene.idle.get(actor.name, set())
+    for channel in (channel for channel in scene.grips[actor.name] if channel not in idle):
         joint, _, kind = channel.rpartition(".")
         if kind != CHANNELS[FLEXION]:
             continue

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PressureView"]
 
-_COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")  # colour scale, from 0 to the peak
-_NOTHING = 1.0  # smallest upper end of the colour scale [Pa]
-
 
 class PressureView:
     """All deformable bodies as one coloured surface; or a single actor or object, with nothing in front of it.
@@ -58,9 +55,7 @@ class PressureView:
             self._refined = [self._surface(prop.name, prop.thing.faces, len(prop.thing.vertices))]
             faces, self._colored, self._plain = [prop.thing.faces], self._plain[:1], []
         self._faces = np.concatenate(faces).astype(np.int32)
-        highest = _NOTHING if pressed is None else max(_NOTHING, pressed.high)
-        title = "contact pressure, kPa"
-        self._scale = render.ColorScale(0.0, highest, title, _COLORS, factor=1e-3, highest=True)
+        self._scale = render.ColorScale.of_pressure(0.0 if pressed is None else pressed.high)
 
     @property
     def faces(self) -> NDArray[np.int32]:

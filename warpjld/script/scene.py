@@ -137,6 +137,7 @@ class Scene:
         warn: Function that receives warnings about rigs and motions; ``warnings`` keeps them for the summary.
         warnings: Warnings so far.
         device: Warp device of searches.
+        idle: Channels of fingers that GRASP … AUTO bent although they take no part, by actor; they do not tighten.
 
     Examples:
         >>> from warpjld.script import Interpreter
@@ -174,6 +175,7 @@ class Scene:
     warn: Callable[[str], None] = _to_stderr
     warnings: list[str] = field(default_factory=list)
     device: str = "cpu"
+    idle: dict[str, set[str]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         counts = ((len(self.actors), "actor"), (len(self.props), "object"))

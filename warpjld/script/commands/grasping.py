@@ -201,6 +201,7 @@ def release(scene: Scene, arguments: Arguments) -> None:
     actor = scene.actor_with(read_side(scene, arguments))
     if actor.name not in scene.grips:
         raise arguments.error(f"actor {actor.name} has grasped nothing", arguments.position)
+    scene.idle.pop(actor.name, None)
     for channel, value in scene.grips.pop(actor.name).items():
         keys = actor.motion.tracks[channel].keys
         # exactly the last key's value, so that the spline between the two is constant

@@ -37,7 +37,7 @@ def squeeze(scene: Scene, arguments: Arguments) -> None:
     actor = gripping_actor(scene, arguments)
     if not arguments.keyword("FORCE"):
         degrees = arguments.number("the angle in degrees, or FORCE", minimum=-90, maximum=90)
-        for channel, now, (low, high) in flexions_of_grip(actor, scene.grips[actor.name], first):
+        for channel, now, (low, high) in flexions_of_grip(scene, actor, first):
             actor.set_keys(channel, [first], now, scene.spline)
             actor.set_keys(channel, [last], min(max(now + math.radians(degrees), low), high), scene.spline)
         return
@@ -118,7 +118,7 @@ def _held_keys(scene: Scene, actor: Actor, arguments: Arguments, first: float, *
     if actor.recorded is not None:
         raise arguments.error(f"actor {actor.name} is driven by a MOTION file: no grip can be searched for")
     channels = []
-    for channel, now, _ in flexions_of_grip(actor, scene.grips[actor.name], first):
+    for channel, now, _ in flexions_of_grip(scene, actor, first):
         actor.set_keys(channel, [first, *later], now, REST)
         channels.append(channel)
     if not channels:

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["surfaces_of_frames", "view_of_frames"]
 
 _OBJECT = "#8fa3b8"
-_COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
-_LEAST = 1.0  # Pa: top of the colour scale if there is no contact pressure
 
 
 def surfaces_of_frames(model: ContactModel, frames: Sequence[SolvedFrame], before: StartFrame) -> DeformedSurfaces:
@@ -47,7 +45,7 @@ def view_of_frames(surfaces: DeformedSurfaces) -> SurfaceView:
     from warpjld.page.view import SurfaceView
     from warpjld.render import ColorScale
 
-    scale = ColorScale(0.0, max(_LEAST, surfaces.high), "contact pressure, kPa", _COLORS, factor=1e-3)
+    scale = ColorScale.of_pressure(surfaces.high)
     numbers = [surfaces.model.start, *(solved.frame for solved in surfaces.frames)] if surfaces.frames else []
     return SurfaceView([_seen(surfaces, frame, scale) for frame in numbers], numbers=numbers)
 

@@ -22,11 +22,11 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.digit_squeeze import DigitSqueeze
 from warpjld.simulation.grip.force import ForceStatus
 from warpjld.simulation.grip.found import FoundGrip, digits_that_press
+from warpjld.simulation.grip.opposed import allowed_left, worst_opposed
+from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.shared_force import PressedDigits, share_force
 from warpjld.simulation.grip.squeeze import Squeeze
-from warpjld.simulation.report.balance import ObjectBalance, balances
-from warpjld.simulation.solve.grasp_balance import allowed_net
-from warpjld.simulation.solve.solved_frame import solved_frame
+from warpjld.simulation.report.balance import ObjectBalance
 from warpjld.simulation.specification import GripSpecification
 
 __all__ = ["BalancedGrip", "balanced_grip", "opposed_scales", "with_balance"]
@@ -48,6 +48,8 @@ _EVEN = 0.25
 """Largest relative error of a digit's force: those of weak digits, which hardly matter, would take most trials."""
 _ROUNDS = 2
 """Most distributions: directions of forces change as digits close, and are not known before a digit presses."""
+_REACHED = 1.03
+"""Force over the one asked for that counts as the same, as searches find it within 2 %."""
 _SPARE = 2.0
 """Force at which the share of a digit is 1, over the force it should have: shares stay below 1, as those of muscles."""
 
@@ -106,50 +108,67 @@ def balanced_grip(
     request: GripSpecification,
     squeeze: Squeeze,
     grip: float,
+    before: ObjectBalance,
     joints: Sequence[int],
     start: float,
     tell: Callable[[str], None],
 ) -> BalancedGrip | None:
-    """Closings of the digits that balance a rigid object which equal closings leave unbalanced; None if it is balanced,
-    or none are found that leave less over.
+    """Closings of the digits that balance a rigid object which equal closings leave unbalanced, with the force of the
+    request, or else with the largest that was found; None if none of those tried balance it.
 
     Args:
         request: Specification of the grip, with its force.
         squeeze: Equal closings.
         grip: Equal closing that presses with that force [rad].
+        before: Balance of the object there.
         joints: The joints that close.
         start: First step of a digit that does not press [rad].
         tell: Called with a line about every trial.
     """
     model, hand, force = squeeze.model, squeeze.hand, request.force
-    closed = squeeze.closed(grip)
-    before = _worst(model, closed.last) if closed.converged else None
-    if before is None or force is None:
-        return None
-    effort, instant, balance = squeeze.effort(grip, closed.last), closed.last, before
+    assert force is not None
+    closed, balance = squeeze.closed(grip), before
+    effort, instant = squeeze.effort(grip, closed.last), closed.last
     taking = _taking_part(hand, joints, effort, force)
-    each = DigitSqueeze(model, squeeze.history, hand, taking, squeeze.first, squeeze.limits)
+    each = DigitSqueeze(model, squeeze.history, hand, taking, squeeze.first, squeeze.limits, SearchBudget())
     low, high = each.range(request.most)
-    grips, best = np.full(len(taking), grip), None
+    high[each.touch > high] = 0.0  # a digit that touches nothing stays as it is
+    grips = np.full(len(taking), grip)
+    for alike in squeeze.known:
+        each.note(np.full(len(taking), alike), squeeze.angles(alike), squeeze.closed(alike))
     for _ in range(_ROUNDS if len(taking) > 1 else 0):
         wanted = _distributed(model, hand, instant, balance, effort, each.digits, force)
         if wanted is None:
             break
         each.wanted = _SPARE * wanted
-        press = _telling(each, wanted, tell)
-        found = share_force(press, low, high, each.wanted, force, start=start, even=_EVEN, begin=grips)
+        press, strengths, touch = _telling(each, wanted, tell), each.wanted, each.touch
+        found = share_force(press, low, high, strengths, force, start=start, even=_EVEN, begin=grips, touch=touch)
         known = each.known(found.grips)
-        if known is None or found.pressed is None or found.status not in (ForceStatus.REACHED, ForceStatus.UNEVEN):
+        if known is None or found.status not in (ForceStatus.REACHED, ForceStatus.UNEVEN):
             break
         effort, instant, grips = each.effort(found.grips, known), known, found.grips
-        after = _worst(model, instant, before.object)
+        after = worst_opposed(model, instant, before.object)
         if after is None or max(one.share for one in effort.digits) > 1.0 or not after.net < _LOWER * balance.net:
             break
-        forces, angles = found.pressed.forces, each.angles(grips)
-        best = BalancedGrip(each.digits, each.joints, grips, forces, angles, effort, before, after)
-        if after.net <= _allowed(after):
+        if after.net <= allowed_left(after):
             break
         balance = after
+    return _firmest(each, before, force)
+
+
+def _firmest(each: DigitSqueeze, before: ObjectBalance, force: float) -> BalancedGrip | None:
+    """The grip found that presses with most, but not with more than ``force`` [N] or than muscles can, and balances the
+    object; None if there is none."""
+    best = None
+    for grips, instant in each.found:
+        after = worst_opposed(each.model, instant, before.object)
+        if after is None or after.net > allowed_left(after):
+            continue
+        effort = each.effort(grips, instant)
+        forces = np.array([effort[digit].force for digit in each.digits])
+        over = forces.sum() > _REACHED * force or max(one.share for one in effort.digits) > 1.0
+        if not over and (best is None or forces.sum() > best.forces.sum()):
+            best = BalancedGrip(each.digits, each.joints, grips, forces, each.angles(grips), effort, before, after)
     return best
 
 
@@ -204,23 +223,10 @@ def _telling(each: DigitSqueeze, wanted: Array, tell: Callable[[str], None]) -> 
 
 
 def with_balance(found: FoundGrip, balanced: BalancedGrip) -> FoundGrip:
-    """The grip found with equal closings, replaced by balanced ones; without edits."""
+    """The grip found with equal closings, replaced by balanced ones."""
     text, digits = f"{found.text}; {balanced.text}", digits_that_press(balanced.effort)
     most, force = float(balanced.grips.max()), float(balanced.forces.sum())
     return replace(found, text=text, grip=most, force=force, digits=digits)
-
-
-def _worst(model: ContactModel, instant: ContactInstant, name: str = "") -> ObjectBalance | None:
-    """Balance of the unbalanced rigid object with the largest resultant among those that only hands touch, or of the
-    named one whether it is balanced or not."""
-    rigid = [one for one in balances(model, solved_frame(model.start + instant.time, [instant])) if one.by_hands]
-    rigid = [one for one in rigid if one.object in model.obstacles and (one.object == name or one.net > _allowed(one))]
-    return max(rigid, key=lambda one: one.net, default=None)
-
-
-def _allowed(balance: ObjectBalance) -> float:
-    """Resultant up to which it counts as balanced [N]."""
-    return allowed_net(balance.pressing, balance.weight)
 
 
 def _wrenches(

@@ -15,8 +15,10 @@ from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.bone_room import bone_room
+from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.shared_force import SAME_CLOSING, PressedDigits
 from warpjld.simulation.grip.squeeze import TRAVEL
+from warpjld.simulation.grip.touch_room import touch_room
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.sensitivity.effort_slope import EffortTangent
 from warpjld.simulation.sensitivity.parameters import angles_perturbed
@@ -40,14 +42,18 @@ class DigitSqueeze:
         joints: Digit, as in its efforts → indices of the joints that flex.
         after: Initial equilibrium.
         limits: Digit → force limit that differs from the default [N].
+        budget: Linear solves that the search may take; by default without a bound.
 
     Attributes:
+        model: As given.
         digits: Names of the digits that close, in the order of all arrays.
         joints: Joints of each.
         wanted: Force of each digit of which its share is measured [N], shape (D,); None: shares are those of muscles.
         solved: Equilibria solved so far, beside the initial one.
         bone_room: Digit, such as ``index`` → largest closing at which its bones are outside every object [rad], where
             that is below the largest that ``range`` was asked for.
+        touch: Closing at which each digit touches first [rad], shape (D,), infinite for those that touch nothing;
+            known once ``range`` was asked for.
     """
 
     def __init__(
@@ -58,8 +64,10 @@ class DigitSqueeze:
         joints: Mapping[str, Sequence[int]],
         after: ContactSolution,
         limits: Mapping[str, float] | None = None,
+        budget: SearchBudget | None = None,
     ) -> None:
-        self._model, self._history, self._hand, self._limits = model, history, hand, limits
+        self._budget = budget
+        self.model, self._history, self._hand, self._limits = model, history, hand, limits
         self.wanted: Array | None = None
         self.digits, self.joints = tuple(joints), [list(one) for one in joints.values()]
         self._start, self._time = hand.bones.angles(after.last.time), after.last.time
@@ -67,6 +75,7 @@ class DigitSqueeze:
         self._known: list[tuple[Array, ContactSolution]] = [(np.zeros(len(self.digits)), after)]
         self.solved = 0
         self.bone_room: dict[str, float] = {}
+        self.touch = np.zeros(len(self.digits))
 
     def range(self, most: float) -> tuple[Array, Array]:
         """Closings at which the last joint of each digit reaches its limit, or its bone an object [rad], each (D,).
@@ -79,9 +88,14 @@ class DigitSqueeze:
         high = [min(most, float((self._bounds[one, 1] - now[one]).max())) for one in self.joints]
         count = len(self.digits)
         self.bone_room = room = bone_room(
-            self._model, self._hand, self._time, lambda by: self.angles(np.full(count, by)), max(high)
+            self.model, self._hand, self._time, lambda by: self.angles(np.full(count, by)), max(high)
         )
         high = [min(one, room.get(name.rpartition(".")[2], most)) for name, one in zip(self.digits, high, strict=True)]
+        after, names = self._known[0][1].last.displacement, [digit.rpartition(".")[2] for digit in self.digits]
+        touch = touch_room(
+            self.model, self._hand, after, self._time, lambda by: self.angles(np.full(count, by)), max(high)
+        )
+        self.touch = np.array([touch.get(name, np.inf) for name in names])
         return np.clip(low, -most, 0.0), np.maximum(high, 0.0)
 
     def angles(self, grips: Array) -> Array:
@@ -107,12 +121,22 @@ class DigitSqueeze:
 
     def effort(self, grips: Array, instant: ContactInstant) -> Effort:
         """Effort of the muscles at closings (D,)."""
-        return effort_at(self._model, self._hand, self._posed(self.angles(grips)), instant, self._limits)
+        return effort_at(self.model, self._hand, self._posed(self.angles(grips)), instant, self._limits)
 
     def known(self, grips: Array) -> ContactInstant | None:
         """The equilibrium at closings that were tried; None if it was not found."""
         found = self._tried(grips)
         return None if found is None else found.last
+
+    def note(self, grips: Array, angles: Array, closed: ContactSolution) -> None:
+        """Take over an equilibrium at closings (D,) that is known already, if its joint angles (J, 4) are the same."""
+        if closed.converged and np.abs(self.angles(grips) - angles).max() < SAME_CLOSING:
+            self._known.append((grips.copy(), closed))
+
+    @property
+    def found(self) -> tuple[tuple[Array, ContactInstant], ...]:
+        """All equilibria that were found: closings (D,), and the equilibrium there."""
+        return tuple((at, closed.last) for at, closed in self._known)
 
     def _tried(self, grips: Array) -> ContactSolution | None:
         return next((closed for at, closed in self._known if np.abs(at - grips).max() < SAME_CLOSING), None)
@@ -124,23 +148,37 @@ class DigitSqueeze:
         """
         if (same := self._tried(grips)) is not None:
             return same
+        if self._budget is not None and self._budget.exhausted:
+            return None
         below = [one for one in self._known if (one[0] <= np.maximum(grips, 0.0) + SAME_CLOSING).all()]
         at, before = max(below, key=lambda one: float(one[0].sum()))
-
-        def moves(share: float) -> Moves:
-            return self._hand.bones.moves_of(self.angles(at + share * (grips - at)), self._time)
-
+        near = np.maximum(at, np.minimum(grips, self.touch))
+        if (near > at + SAME_CLOSING).any():
+            found = self._onward(before, at, near, 1)  # nothing touches on the way
+            if found.converged:
+                at, before = near, found
         steps = self._hand.bones.steps([(self.angles(end), self._time) for end in (at, grips)], TRAVEL)
-        found = solve_branch(self._model, self._history, before, steps, moves=(self._hand.name, moves))
+        found = self._onward(before, at, grips, steps)
         self.solved += 1
         if not found.converged:
             return None
         self._known.append((grips.copy(), found))
         return found
 
+    def _onward(self, before: ContactSolution, at: Array, grips: Array, steps: int) -> ContactSolution:
+        """Equilibrium at closings (D,) from that at others, in a number of load steps."""
+
+        def moves(share: float) -> Moves:
+            return self._hand.bones.moves_of(self.angles(at + share * (grips - at)), self._time)
+
+        budget, closing = self._budget, (self._hand.name, moves)
+        most = None if budget is None else max(1, budget.next)
+        found = solve_branch(self.model, self._history, before, steps, moves=closing, solves=most)
+        return found if budget is None else budget.counted(found)
+
     def _slopes(self, grips: Array, closed: ContactSolution, effort: Effort) -> Array | None:
         """Derivatives of the shares by the closings [1/rad], shape (D, D); None if the equilibrium has none."""
-        model, hand, time, angles = self._model, self._hand, self._time, self.angles(grips)
+        model, hand, time, angles = self.model, self._hand, self._time, self.angles(grips)
         largest = [int(effort[digit].shares.argmax()) for digit in self.digits]
         out = np.zeros((len(self.digits), len(self.digits)))
         try:

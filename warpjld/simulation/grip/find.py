@@ -16,9 +16,11 @@ from warpjld.simulation.grip.find_shared import find_shared
 from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.found import FoundGrip, SupportRelease, digits_that_press, trial_row
 from warpjld.simulation.grip.hand_trials import HandTrials
+from warpjld.simulation.grip.opposed import firmest_opposed, worst_opposed
 from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.squeeze import Squeeze
+from warpjld.simulation.report.balance import ObjectBalance
 from warpjld.simulation.specification import GripSpecification
 from warpjld.skeleton.channels import FLEXION
 
@@ -29,6 +31,8 @@ _START = math.radians(0.5)
 _NEAR = 0.03
 """Tolerance of the smallest grip, relative to its force."""
 
+_REACHED = 0.03
+"""Relative tolerance of a force that was asked for, as searches find it within 2 %."""
 _TRIALS = 10
 """Most grips tried; as a rule three or four are enough."""
 
@@ -63,11 +67,57 @@ def find_grip(
     squeeze.keep_bones_out(request.most)
     most = max(min(request.most, squeeze.room), 1e-6)
     found = _gentlest(request, squeeze, most, tell) if request.lift else _firm(request, squeeze, most, tell)
-    if not request.lift and not request.digits and found.status == ForceStatus.REACHED.name:
-        balanced = balanced_grip(request, squeeze, found.grip, joints, _START, tell)
-        if balanced is not None:
-            return replace(with_balance(found, balanced), edits=_closed_edits(hand, request, balanced))
+    if not request.lift and not request.digits:
+        return _opposed(found, request, squeeze, joints, tell)
     return replace(found, edits=_edits(squeeze, request, joints, found.grip))
+
+
+def _opposed(
+    found: FoundGrip,
+    request: GripSpecification,
+    squeeze: Squeeze,
+    joints: Sequence[int],
+    tell: Callable[[str], None],
+) -> FoundGrip:
+    """A grip found with equal closings; where it leaves a rigid object unbalanced, one that closes digit by digit, or
+    as far as what the digits press with is opposed."""
+    assert request.force is not None
+    closed = squeeze.closed(found.grip)
+    before = worst_opposed(squeeze.model, closed.last) if closed.converged and not found.interrupted else None
+    if before is None:
+        return replace(found, edits=_edits(squeeze, request, joints, found.grip))
+    balanced = None
+    if found.status == ForceStatus.REACHED.name:
+        balanced = balanced_grip(request, squeeze, found.grip, before, joints, _START, tell)
+    if balanced is None or abs(balanced.forces.sum() / request.force - 1.0) > _REACHED:
+        alike = _alike(found, request, squeeze, before, tell)
+        if balanced is None or balanced.forces.sum() <= alike.force:
+            return replace(alike, edits=_edits(squeeze, request, joints, alike.grip))
+        found = replace(alike, text=f"{ForceStatus.UNOPPOSED.value}; {request.force:.3g} N asked for")
+    return replace(with_balance(found, balanced), edits=_closed_edits(squeeze.hand, request, balanced))
+
+
+def _alike(
+    found: FoundGrip,
+    request: GripSpecification,
+    squeeze: Squeeze,
+    before: ObjectBalance,
+    tell: Callable[[str], None],
+) -> FoundGrip:
+    """The firmest equal closings that leave the object balanced; without edits."""
+    status = ForceStatus.UNOPPOSED
+    grip = firmest_opposed(squeeze, before.object, found.grip, tell)
+    effort = squeeze.effort(grip, squeeze.closed(grip).last)
+    worst = max(effort.digits, key=lambda digit: digit.share)
+    force = sum(digit.force for digit in effort.digits)
+    text = (
+        f"{status.value}; {request.force:.3g} N asked for, {force:.3g} N reached, closing on by "
+        f"{math.degrees(grip):.2f}°; with {found.force:.3g} N {before.net:.3g} N would be left over on {before.object}"
+    )
+    row = trial_row(request, grip, PressedForce(force, worst.share, worst.digit), True, status.name)
+    rows = [one | {"chosen": 0, "status": status.name} for one in found.rows if one["grip_deg"] != row["grip_deg"]]
+    digits = digits_that_press(effort)
+    return replace(found, status=status.name, text=text, grip=grip, force=force, digits=digits, rows=(*rows, row))
 
 
 def _closed_edits(hand: FleshBody, request: GripSpecification, balanced: BalancedGrip) -> tuple[AngleEdit, ...]:

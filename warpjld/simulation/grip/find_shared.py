@@ -56,7 +56,7 @@ def find_shared(
         return pressed
 
     low, high = squeeze.range(request.most)
-    found = share_force(press, low, high, strengths, request.force, start=_START)
+    found = share_force(press, low, high, strengths, request.force, start=_START, touch=squeeze.touch)
     instant = squeeze.known(found.grips)
     effort = squeeze.effort(found.grips, instant) if instant is not None and instant.touches else None
     rows = [

@@ -26,6 +26,7 @@ class ForceStatus(Enum):
     UNEVEN = "the digits press with that force, but not each with the same share of its muscles"
     HARDER_ALREADY = "the digits press harder than that before they close on"
     TOO_WEAK = "unreachable: more force would be needed than the muscles have"
+    UNOPPOSED = "unreachable: nothing opposes more, which would push the object away"
     LIMIT = "unreachable: the digits are bent as far as they may"
     NO_CONTACT = "nothing is touched however far the digits bend"
     NO_SOLUTION = "contact could not be solved at a firmer grip"

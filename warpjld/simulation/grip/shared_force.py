@@ -48,6 +48,9 @@ _SLIPS = 0.5
 """The same below which a digit that presses less as it closes on slips off the object."""
 _STILL = 0.2
 """Largest closing of all others, relative to that digit's own, that does not explain it."""
+_PAST = 8.0
+"""Closing beyond where a digit should touch, over the first step, after which one that does not even graze passes by
+what it should press on: 5 mm of a fingertip with steps of half a degree, where flesh would press with several N."""
 _SINGULAR = 1e4
 """Condition number above which the digits cannot press apart from one another."""
 SAME_CLOSING = 1e-9
@@ -100,6 +103,7 @@ def share_force(
     tolerance: float = 0.02,
     even: float = 0.05,
     begin: Array | None = None,
+    touch: Array | None = None,
 ) -> SharedGrip:
     """Find closings from 0 on at which the digits' shares are equal and their forces sum to ``force``.
 
@@ -112,12 +116,14 @@ def share_force(
         tolerance: Relative tolerance of the sum.
         even: Largest difference of a share from the mean of the shares, relative to it.
         begin: Closings of the first trial, shape (D,); 0 by default.
+        touch: Closings at which the digits are expected to touch first, shape (D,): one that does not press yet goes
+            there in one step; by default nothing is expected.
 
     Raises:
         InputError: Ranges that do not contain 0, a force, strength or step that is not above 0.
     """
     bounds, most = [np.asarray(end, dtype=np.float64) for end in (low, high)], np.asarray(strengths, dtype=np.float64)
-    search = _Search(bounds[0], bounds[1], most, force, start)
+    search = _Search(bounds[0], bounds[1], most, force, start, np.full(len(most), np.nan) if touch is None else touch)
     if not (len(search.low) and (search.low <= 0.0).all() and (search.high >= 0.0).all()):
         raise InputError(f"grip: want digits that may close from 0 on, got ranges {search.low} to {search.high}")
     if not (force > 0.0 and np.isfinite(force) and start > 0.0 and (search.strengths > 0.0).all()):
@@ -149,8 +155,9 @@ def share_force(
 class _Search:
     """State of a search: its trials, and the steps of digits that do not press yet."""
 
-    def __init__(self, low: Array, high: Array, strengths: Array, force: float, start: float) -> None:
+    def __init__(self, low: Array, high: Array, strengths: Array, force: float, start: float, touch: Array) -> None:
         self.low, self.high, self.strengths, self.force, self.start = low, high, strengths, force, start
+        self._touch = touch
         self.trials: list[tuple[Array, PressedDigits]] = []
         self._reach, self._most = np.full(len(low), start), np.full(len(low), _FARTHEST * start)
         self._best, self._idle = np.inf, 0
@@ -210,11 +217,15 @@ class _Search:
         return None
 
     def _note_slips(self) -> None:
-        """Find digits that press less than before because they closed on: past the end of the object, or round it."""
+        """Find digits that press less than before because they closed on: past the end of the object, or round it; and
+        those that are long past where they should touch."""
+        grips, found = self.trials[-1]
+        share, able = self.wanted(grips, found)
+        past = grips - self._touch >= _PAST * self.start
+        self._slipped |= able & past & (found.shares < _GRAZES * share)
         if len(self.trials) < 2:
             return
-        (before, pressed), (grips, found) = self.trials[-2:]
-        share, able = self.wanted(grips, found)
+        before, pressed = self.trials[-2]
         moved = grips - before
         for d in np.flatnonzero(able & (moved >= self.start) & (found.shares < pressed.shares)).tolist():
             alone = np.abs(np.delete(moved, d)).max(initial=0.0) <= _STILL * moved[d]
@@ -236,11 +247,14 @@ class _Search:
         return np.clip(grips + step, self.low, self.high)
 
     def _toward(self, d: int) -> float:
-        """Step of a digit that does not press: half-way to a closing at which it did, else twice the step before."""
+        """Step of a digit that does not press: half-way to a closing at which it did, else to just beyond where it
+        should touch, else twice the step before."""
         here = self.trials[-1][0][d]
         pressed = [grips[d] for grips, found in self.trials if self.pressing(found)[d] and grips[d] > here]
         if pressed:
             return 0.5 * float(min(pressed) - here)
+        if here < self._touch[d]:
+            return float(self._touch[d] - here) + self.start
         step, self._reach[d] = self._reach[d], 2.0 * self._reach[d]
         return float(step)
 

@@ -75,6 +75,11 @@ class Squeeze:
         """Grip at which the last joint reaches its limit, or the bone of its digit an object [rad]."""
         return float((self._high - self._start[self._joints, FLEXION]).max(initial=0.0))
 
+    @property
+    def known(self) -> list[float]:
+        """Grips whose equilibria were found, ascending [rad]."""
+        return sorted(self._closed)
+
     def angles(self, grip: float) -> NDArray[np.float64]:
         """Joint angles at a grip [rad], shape (J, 4)."""
         out = self._start.copy()

@@ -22,7 +22,6 @@ GRIP_SHARES = {"index": 37.0, "middle": 37.5, "ring": 27.0, "pinky": 13.4}
 
 _FINGERS = tuple(GRIP_SHARES)
 _INKS = ("#4d7ea8", "#c8553d", "#6a994e", "#bc8034", "#7b5ea7", "#23272e")
-_COLORS = ("#b9b3aa", "#ebb54d", "#e2762f", "#c9302c", "#7a1030", "#3a0520")
 _VIEW = (400, 300)
 """Width and height of one pressure map, including the colour scale [pixels]."""
 
@@ -123,7 +122,7 @@ def _maps(path: Path, plan: GraspPlan, rows: Sequence[Row], arrays: Mapping[str,
         if (most := _highest(hand.name, thing.name, rows, arrays)) is not None
     }
     top = max(float(pressure.max()) for pressure in found.values())
-    scale = ColorScale(0.0, max(top, 1.0), "contact pressure, kPa", _COLORS, factor=1e-3, highest=True)
+    scale = ColorScale.of_pressure(top)
     hands = [hand for hand in plan.hands if any(name == hand.name for name, _ in found)]
     things = [thing.name for thing in plan.objects if any(name == thing.name for _, name in found)]
     pictures = []
