@@ -40,7 +40,7 @@ from warpjld.simulation.bodies.skin_obstacle import bystanders
 from warpjld.simulation.display.solved_surfaces import surfaces_of_frames, view_of_frames
 from warpjld.simulation.display.surfaces import DeformedSurfaces
 from warpjld.simulation.display.visible_pressure import VisiblePressure
-from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
+from warpjld.simulation.free_fall import after_contact, before_contact, let_go, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.found import FoundGrip
 from warpjld.simulation.report.parted import parted_notes
@@ -276,11 +276,12 @@ def simulate(
             specification,
             request,
             watch=watch,
+            falling=lambda ended: let_go(ended, specification, request),
             checkpoint=None if request.state is None else checkpoint,
             saving=lambda save: keeping(lambda: checkpoint.path if save(checkpoint) else None),
             progress=progress,
         )
-    before, solved = after_contact(solved, specification, request, before)
+    before, solved = after_contact(solved, before)
     return _report(solved, before, table, request, notes)
 
 
@@ -311,10 +312,13 @@ def _model(
 
 
 def _frames(specification: ContactSpecification, request: SolveSpecification, start: float) -> list[float]:
-    """Frames to solve, ascending: every ``request.every``-th, the last, and those at which a grip begins or ends."""
+    """Frames to solve, ascending: every ``request.every``-th, the last, and those at which a grip or a hold ends or a
+    grip begins."""
     frames = {float(f) for f in range(request.first, request.last + 1, request.every)} | {float(request.last)}
     for grip in specification.grips:
         frames |= {grip.first, grip.middle, grip.last}
+    for state in specification.prescribed.values():
+        frames |= {state.until} if state.held and request.first < state.until < request.last else set()
     return sorted(f for f in frames if f > start)
 
 

@@ -9,10 +9,12 @@ import numpy as np
 
 from warpjld.fem import SolveStatus
 from warpjld.fem.contact import ContactSolution
+from warpjld.fem.contact.law.contact_state import ContactState, without_bonds
 from warpjld.files.reading import reading
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.fall.fall_path import fall_summaries
 from warpjld.simulation.grip.correct_frames import correct_frame, uncorrected
 from warpjld.simulation.grip.find import find_grip
 from warpjld.simulation.grip.found import FoundGrip
@@ -22,6 +24,8 @@ from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightB
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
 from warpjld.simulation.solve.corrected_digit import CorrectedDigit
+from warpjld.simulation.solve.fallen import falling_model, rest_frames
+from warpjld.simulation.solve.falling import Falls
 from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits
 from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
@@ -29,7 +33,7 @@ from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
 from warpjld.simulation.solve.untouched import solve_untouched
 from warpjld.simulation.solve_result import KnownEquilibrium, SolveResult
-from warpjld.simulation.specification import ContactSpecification, GripSpecification, SolveSpecification
+from warpjld.simulation.specification import BondStrength, ContactSpecification, GripSpecification, SolveSpecification
 
 __all__ = ["Progress", "Save", "solve_frames"]
 
@@ -38,6 +42,9 @@ Progress = Callable[[str, int, int], None]
 
 Watch = Callable[[ContactModel, SolvedFrame], str | None]
 """Called with the model and each frame after it is solved; a returned text stops the run (R118)."""
+
+Falling = Callable[[SolveResult], Falls | None]
+"""Called before each frame, and where one has no equilibrium; returns the falls of what nothing holds any more, if any."""
 
 Save = Callable[[CheckpointFile], bool]
 """Saves the frames solved so far; returns False if there is nothing to resume from."""
@@ -50,6 +57,7 @@ def solve_frames(
     request: SolveSpecification,
     *,
     watch: Watch = lambda model, solved: None,
+    falling: Falling = lambda result: None,
     checkpoint: CheckpointFile | None = None,
     saving: Callable[[Save], None] = lambda save: None,
     progress: Progress = lambda what, done, total: None,
@@ -63,7 +71,10 @@ def solve_frames(
         contact: Grips to find and strength of the muscles.
         request: Solution method and options.
         watch: Called after each solved frame; a returned text stops the run (R118).
-        checkpoint: File of the solved frames; a state left by an earlier run is resumed.
+        falling: Called before each frame, and where one has no equilibrium; what it returns falls, and contact goes on
+            with it (R139).
+        checkpoint: File of the solved frames; a state left by an earlier run is resumed. Frames after an object is let
+            go are not in it.
         saving: Called once before the first frame with a function that saves the frames solved so far, at any time.
         progress: Called with what is being done.
 
@@ -80,7 +91,7 @@ def solve_frames(
     if not model.pairs:
         return _untouched(model, frames, watch, progress)
     try:
-        return _solve_on(run, frames, watch, checkpoint, progress)
+        return _solve_on(run, frames, watch, falling, checkpoint, progress)
     except KeyboardInterrupt:
         if not run.done:
             raise
@@ -101,15 +112,29 @@ def _untouched(model: ContactModel, frames: Sequence[float], watch: Watch, progr
 
 
 def _solve_on(
-    run: _Run, frames: Sequence[float], watch: Watch, checkpoint: CheckpointFile | None, progress: Progress
+    run: _Run,
+    frames: Sequence[float],
+    watch: Watch,
+    falling: Falling,
+    checkpoint: CheckpointFile | None,
+    progress: Progress,
 ) -> SolveResult:
-    """Solve the remaining frames."""
-    contact = run.contact
-    for frame in frames[len(run.done) :]:
+    """Solve the remaining frames, and those at which objects that were let go come to rest."""
+    contact, ahead = run.contact, list(frames[len(run.done) :])
+    while ahead:
+        frame = ahead[0]
         progress(f"contact, frame {frame:g}", len(run.done), len(frames))
-        failure = run.solve(frame)
+        falls = falling(run.ended(SolveStatus.CONVERGED, SolveStatus.CONVERGED.value))
+        failure = None if falls is not None else run.solve(frame)
         if failure is not None:
-            return failure
+            falls = falling(failure)
+        if falls is not None and (rests := run.let_go(falls, frames[-1])):
+            ahead = sorted({*ahead, *rests})
+            continue
+        if falls is not None or failure is not None:
+            failure = failure or run.ended(SolveStatus.UNHELD, f"nothing holds {_listed(falls)} at frame {frame:g}")
+            return replace(failure, unsolved=falls)
+        ahead.pop(0)
         grip = next((one for one in contact.grips if one.first == frame), None)
         if checkpoint is not None and grip is None:
             run.save(checkpoint)
@@ -144,6 +169,9 @@ class _Run:
     tight: dict[tuple[str, str, str], tuple[float, TightBone]] = field(default_factory=dict)
     equilibria: dict[float, KnownEquilibrium] = field(default_factory=dict)
     settled: tuple[ContactModel, Checkpoint] | None = None
+    saved: Checkpoint | None = None
+    released: float | None = None
+    falls: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
@@ -238,9 +266,9 @@ class _Run:
 
     def save(self, checkpoint: CheckpointFile) -> bool:
         """Save the solved frames; returns False if there are none."""
-        if self.settled is None:
+        if self.saved is None:
             return False
-        checkpoint.save(self.settled[1])
+        checkpoint.save(self.saved)
         return True
 
     def interrupted(self) -> SolveResult:
@@ -261,6 +289,8 @@ class _Run:
         corrections = tuple(self.corrected), tuple(self.uncorrected)
         known = Checkpoint(tuple(self.done), self.last, *parts, tuple(self.edited), *corrections)
         self.settled = self.model, known
+        if self.released is None:
+            self.saved = known
 
     def _bone_inside(self, model: ContactModel, times: Sequence[float]) -> str | None:
         """Message about a bone inside an object at one of the times; None if there is none."""
@@ -298,6 +328,16 @@ class _Run:
             objects = [found.release.applied(one) for one in self.model.objects]
             self.model = replace(self.model, objects=tuple(objects))
 
+    def let_go(self, found: Falls, last: float) -> list[float]:
+        """Let objects fall along their paths; returns the frames at which they rest, empty if contact cannot go on."""
+        rests = [] if found.interrupted is not None else rest_frames(self.model, found.paths, last)
+        if rests and self.last is not None:
+            self.released = self.done[-1].frame if self.released is None else self.released
+            self.model = falling_model(self.model, found.paths)
+            self.last = replace(self.last, states=_opened(self.model, self.last.states, found.bonds))
+            self.falls += [*fall_summaries(found.paths.values()), *found.openings]
+        return rests if self.last is not None else []
+
     def ended(self, status: SolveStatus, message: str) -> SolveResult:
         """Final result of the run with a status."""
         return SolveResult(
@@ -314,6 +354,8 @@ class _Run:
             tuple(self.limits.stops),
             tuple(self.tight.values()),
             self.equilibria,
+            self.released,
+            tuple(self.falls),
         )
 
     def _edit(self, edits: Sequence[AngleEdit]) -> None:
@@ -323,3 +365,24 @@ class _Run:
     def _note(self, solved: SolvedFrame) -> None:
         time = solved.frame - self.model.start
         self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
+
+
+def _listed(falls: Falls | None) -> str:
+    """``'BAR_1' and 'BAR_2'``: the names of what falls."""
+    paths = {} if falls is None else falls.paths
+    return " and ".join(f"'{name}'" for name, path in paths.items() if path.summary())
+
+
+def _opened(
+    model: ContactModel, states: Sequence[ContactState], bonds: Sequence[BondStrength]
+) -> tuple[ContactState, ...]:
+    """Contact states of the model's pairs in which only the given bonds hold, where they have not parted."""
+    held = {frozenset((bond.one, bond.other)): bond.parted for bond in bonds}
+    out = []
+    for pair, owner, state in zip(model.pairs, model.owners, states, strict=True):
+        parted = held.get(frozenset((owner.slave, owner.master)))
+        if pair.bond is not None and parted != ():
+            count = len(state.bonded)
+            state = without_bonds(state, np.ones(count, dtype=bool) if parted is None else np.array(parted))
+        out.append(state)
+    return tuple(out)

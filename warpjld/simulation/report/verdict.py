@@ -114,9 +114,9 @@ def verdict_of(
     last = balances(solved.model, solved.frames[-1]) if solved.frames else []
     touched = any(row.force_n > 0.0 for row in rows)
     status = solved.status.name
-    if solved.released is not None:
+    if solved.released is not None and solved.unsolved is not None:
         status = RELEASED
-        text = f"not held: {solved.message}; contact is not solved after frame {solved.released:g}"
+        text = f"not held: {solved.message}; contact is not solved after frame {frames[1] if frames else solved.start:g}"
     elif solved.status not in (SolveStatus.CONVERGED, SolveStatus.STOPPED):
         text = f"no equilibrium: {solved.message}"
     elif overlaps:
@@ -134,6 +134,9 @@ def verdict_of(
         text = f"not realistic: at frame {worst.frame:g} {worst.digit} needs {need}"
     elif solved.status is SolveStatus.STOPPED:
         text = solved.message
+    elif solved.released is not None:
+        status = RELEASED
+        text = f"not held from frame {solved.released:g} on"
     elif not rows:
         text = "solved"
     elif lost := _lost(solved):
