@@ -96,17 +96,18 @@ def after_contact(solved: SolveResult, before: StartFrame) -> tuple[StartFrame, 
     """
     if before.interrupted is not None:
         return before, _stopped(solved, before.interrupted)
-    before, found = replace(before, falls=(*before.falls, *solved.falls)), solved.unsolved
-    if found is None or not any(path.summary() for path in found.paths.values()):
-        return before, solved
-    moved = dict(before.moved)
-    for name, path in found.paths.items():
-        frames, places = moved.get(name, ([], []))
-        moved[name] = ([*frames, *path.frames], [*places, *path.places])
-    before = replace(before, moved=moved, falls=(*before.falls, *fall_summaries(found.paths.values()), *found.openings))
-    if solved.released is None:
-        solved = replace(solved, released=min(path.frames[0] for path in found.paths.values()))
-    return before, _stopped(solved, found.interrupted)
+    found = [*solved.falls, *([] if solved.unsolved is None else [solved.unsolved])]
+    found = [falls for falls in found if any(path.summary() for path in falls.paths.values())]
+    moved, said = dict(before.moved), list(before.falls)
+    for falls in found:
+        for name, path in falls.paths.items():
+            frames, places = moved.get(name, ([], []))
+            moved[name] = ([*frames, *path.frames], [*places, *path.places])
+        said += [*fall_summaries(falls.paths.values()), *falls.openings]
+    if found and solved.released is None:
+        solved = replace(solved, released=min(path.frames[0] for path in found[0].paths.values()))
+    stopped = None if solved.unsolved is None else solved.unsolved.interrupted
+    return replace(before, moved=moved, falls=tuple(said)), _stopped(solved, stopped)
 
 
 def _stopped(solved: SolveResult, after: float | None) -> SolveResult:

@@ -55,7 +55,7 @@ class SolveResult:
         tight: Frame and smallest clearance between bone and object, by actor, digit and object.
         equilibria: Equilibrium of each frame that this run solved, by frame number, for differentiation.
         released: Frame from which on unheld objects fall; None if there is none.
-        falls: Messages about objects that were let go, fell, and take part in contact again.
+        falls: Falls of objects that were let go while contact was solved, in order.
         unsolved: Falls after which contact is not solved; None if it is solved to the end.
         interrupted: Whether Ctrl-C ended the run.
     """
@@ -74,7 +74,7 @@ class SolveResult:
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
     released: float | None = None
-    falls: tuple[str, ...] = ()
+    falls: tuple[Falls, ...] = ()
     unsolved: Falls | None = None
     interrupted: bool = False
 

@@ -189,7 +189,9 @@ class DeformedSurfaces:
     def _displacement(self, frame: float) -> NDArray[np.float64] | None:
         """Displacements of all nodes at a frame: of what falls along its path, else linear between solved frames."""
         moved, time = self._between(self._displacements, frame), frame - self.model.start
-        for one in self.model.objects if moved is not None else ():
+        if moved is None:
+            return None
+        for one in self.model.objects:
             if (fall := one.falling(time)) is not None:
                 moved[self.model.spans[one.name]] = one.carried_by(fall, time)
         return moved

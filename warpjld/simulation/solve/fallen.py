@@ -213,8 +213,8 @@ def rest_frames(model: ContactModel, paths: Mapping[str, FallPath], last: float)
     """Frames up to ``last`` at which objects that were let go come to rest, ascending; empty if contact cannot go on
     after the falls.
 
-    It cannot where everything stays where it was let go, so that nothing has changed; and there is no need where nothing
-    else deforms, and nothing comes to rest.
+    It cannot where everything stays where it was let go, so that nothing has changed; and there is no need where
+    nothing else deforms, and nothing comes to rest.
     """
     paths = {name: path for name, path in paths.items() if path.summary()}
     if not paths:

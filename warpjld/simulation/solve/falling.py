@@ -39,6 +39,11 @@ class Falls:
     openings: tuple[str, ...] = ()
     interrupted: float | None = None
 
+    @property
+    def listed(self) -> str:
+        """``'BAR_1' and 'BAR_2'``: the names of what moves."""
+        return " and ".join(f"'{name}'" for name, path in self.paths.items() if path.summary())
+
 
 def falling_names(contact: ContactSpecification, request: SolveSpecification) -> list[str]:
     """Deformable objects with weight that neither Dirichlet conditions, loads, a grip that lifts them, nor an object
