@@ -32,7 +32,12 @@ from warpjld.simulation.solve.substeps import Substeps
 from warpjld.simulation.solve_result import KnownEquilibrium, SolveResult
 from warpjld.simulation.specification import BondStrength, ContactSpecification, GripSpecification, SolveSpecification
 
-__all__ = ["FramesRun", "Progress"]
+__all__ = ["FramesRun", "Progress", "soft_crease"]
+
+_STIFFENS = 3.0
+"""Exponent of Fung's law from which flesh is hardly sheared inside out between skin and bone in a crease: a knee of
+elements of 20 mm that bends by 110° in 12 steps has equilibria up to 86° with 1, and to the end with 4; with 3 it bends
+by 120° in 12 steps, and by 130° in 14."""
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
@@ -116,7 +121,8 @@ class FramesRun:
             )
         if not solution.converged:
             ahead = [self._bone_inside(driven, [step]) for step in steps if step > solution.last.time]
-            reason = next(filter(None, ahead), f"at frame {frame:g}: {solution.message}")
+            hint = soft_crease(self.contact)
+            reason = next(filter(None, ahead), f"at frame {frame:g}: {solution.message}{hint}")
             return self.ended(solution.status, reason)
         self._note_bones(driven, frame)
         self._edit(self.limits.edits(model, since, time))
@@ -254,6 +260,17 @@ class FramesRun:
     def _note(self, solved: SolvedFrame) -> None:
         time = solved.frame - self.model.start
         self.history = self.model.after(self.history, time, solved.displacement, solved.reactions, solved.nodal)
+
+
+def soft_crease(contact: ContactSpecification) -> str:
+    """What to try where flesh bends by its bones and hardly stiffens; empty if none does."""
+    for name, flesh in contact.flesh.items():
+        if flesh.flexion and flesh.stiffening < _STIFFENS:
+            return (
+                f"; flesh of {name} has STIFFENING {flesh.stiffening:g}: in creases it is sheared inside out more easily "
+                f"where it is thin over a bone than with {_STIFFENS:g} or more"
+            )
+    return ""
 
 
 def _opened(
