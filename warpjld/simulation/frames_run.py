@@ -267,7 +267,7 @@ def soft_crease(contact: ContactSpecification) -> str:
     for name, flesh in contact.flesh.items():
         if flesh.flexion and flesh.stiffening < _STIFFENS:
             return (
-                f"; flesh of {name} has STIFFENING {flesh.stiffening:g}: in creases it is sheared inside out more easily "
+                f"; flesh of {name} has STIFFENING {flesh.stiffening:g}: in creases it shears inside out more easily "
                 f"where it is thin over a bone than with {_STIFFENS:g} or more"
             )
     return ""
