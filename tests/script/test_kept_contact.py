@@ -13,7 +13,7 @@ from warpjld.errors import InputError, WarpjldError
 from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import run_contact
 from warpjld.script.runner import run_scene
-from warpjld.simulation import solve_frames
+from warpjld.simulation import frames_run
 from warpjld.simulation.simulate import KEPT
 
 BLOCK = """
@@ -71,7 +71,7 @@ def test_what_is_solved_is_kept_where_an_output_fails(
             run_scene(scene, tmp_path / "out")
     assert f'PRESS … STATE "{KEPT}" exports them' in scene.warnings[-1]
     again = scene_of(tmp_path, f"PRESS 0 4 STATE '{KEPT}'", "PICTURE 2 'p.png'", "EXPORT 'e.npz'")
-    monkeypatch.setattr("warpjld.simulation.solve_frames._Run.solve", refuse)  # nothing is solved again
+    monkeypatch.setattr("warpjld.simulation.frames_run.FramesRun.solve", refuse)  # nothing is solved again
     run_scene(again, tmp_path / "out")
     assert (tmp_path / "out" / "p.png").exists()
     np.testing.assert_array_equal(shapes(tmp_path / "out"), shapes(whole))
@@ -93,14 +93,14 @@ def test_it_is_kept_where_every_output_fails_and_the_folder_would_not_be_made(
 
 def interrupting(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
     """Ctrl-C after a frame's equilibrium is found and before it counts as done."""
-    solved_frame = solve_frames.solved_frame
+    solved_frame = frames_run.solved_frame
 
     def solved(frame: float, instants: Any, states: Any) -> Any:
         if frame == at:
             raise KeyboardInterrupt
         return solved_frame(frame, instants, states)
 
-    monkeypatch.setattr(solve_frames, "solved_frame", solved)
+    monkeypatch.setattr(frames_run, "solved_frame", solved)
 
 
 def test_frames_solved_before_ctrl_c_are_made_named_and_gone_on_from(

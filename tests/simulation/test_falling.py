@@ -204,8 +204,8 @@ def test_an_interrupted_fall_keeps_its_whole_frames(monkeypatch: pytest.MonkeyPa
 def test_what_is_let_go_falls() -> None:
     scene, found = run(
         "OBJECT TABLE BOX 0.1 0.02 0.1 AT 0 -0.01 0\nOBJECT BLOCK BOX 0.03 0.03 0.03 AT 0 0.05 0\n"
-        "PHYSICAL BLOCK YOUNG 200000 ELEMENT 0.015\nGRAVITY 0 -9.81 0\nFRAMES 0 20\n"
-        "POINTS BLOCK TOP UPPER Y 0.05\nHOLD BLOCK TOP 5\nPRESS 0 20 EVERY 5\n"
+        "PHYSICAL BLOCK YOUNG 200000 ELEMENT 0.03\nGRAVITY 0 -9.81 0\nFRAMES 0 20\n"
+        "POINTS BLOCK TOP UPPER Y 0.05\nHOLD BLOCK TOP 5\nPRESS 0 20 EVERY 20\n"
     )
     assert found.verdict.status == "RELEASED"
     assert not found.verdict.failed
@@ -216,6 +216,9 @@ def test_what_is_let_go_falls() -> None:
     assert shape[:, 1].min() == pytest.approx(0.0, abs=1e-4)
     assert found.surfaces.object("BLOCK", 7.0)[:, 1].min() == pytest.approx(0.035 - 0.5 * 9.81 / 225.0, abs=1e-4)
     assert list(SceneAnimation(scene).objects) == ["TABLE", "BLOCK"]
+    # contact goes on where it rests: the table bears its weight
+    assert found.frames.tolist() == [5.0, 8.0, 20.0]
+    assert found.force("BLOCK")[-1] == pytest.approx([0.0, 1000.0 * 0.03**3 * 9.81, 0.0], rel=1e-3, abs=1e-4)
 
 
 @pytest.mark.slow
@@ -238,6 +241,65 @@ def test_bonded_pieces_that_are_let_go_fall_as_one_and_part_on_impact() -> None:
     for shape in (one, other):
         assert shape[:, 1].min() == pytest.approx(0.0, abs=1e-4)
     assert one[:, 0].max() < other[:, 0].min() + 1e-4
+
+
+SLAB = (
+    "RATE 30\nFRAMES 0 35\nGRAVITY 0 -9.81 0\nFRICTION {friction}\nOBJECT FLOOR BOX 0.6 0.02 0.3 AT 0 -0.01 0\n"
+    "OBJECT SLAB BOX 0.12 0.02 0.08 AT 0 0.06 0 TURN 0 0 20\n"
+    "OBJECT CUBE BOX 0.03 0.03 0.03 AT -0.0114 0.0930 0 TURN 0 0 20\n"
+    "PHYSICAL SLAB YOUNG 50000 ELEMENT 0.02\nPHYSICAL CUBE YOUNG 200000 ELEMENT 0.015\nPOINTS SLAB FOOT LOWER Y 0.05\n"
+    "HOLD SLAB FOOT\nPOINTS CUBE TOP UPPER Y 0.05\nHOLD CUBE TOP 3\nPRESS 0 35 EVERY 35\n"
+)
+
+
+@pytest.mark.slow
+def test_what_is_let_go_lies_on_a_soft_slope_by_friction() -> None:
+    """On a slab tilted by 20° (tan 20° = 0.36) with μ = 0.5, which gives way under it."""
+    _, found = run(SLAB.format(friction=0.5))
+    weight = 1000.0 * 0.03**3 * 9.81
+    assert found.verdict.status == "RELEASED"
+    assert "comes to rest on SLAB at frame" in found.verdict.text
+    assert found.force("CUBE")[-1] == pytest.approx([0.0, weight, 0.0], rel=1e-3, abs=1e-3 * weight)
+    cube, slab = found.surfaces.object("CUBE", 35.0), found.surfaces.object("SLAB", 35.0)
+    assert cube is not None
+    assert slab is not None
+    # pressed alone by the mean pressure, a column 20 mm high below the cube gives way by p h / E; the slab around helps
+    pressed = weight * np.cos(np.radians(20.0)) / 0.03**2 * 0.02 / 5e4
+    normal = np.array([-np.sin(np.radians(20.0)), np.cos(np.radians(20.0)), 0.0])
+    sunk = 0.025 - float((cube.mean(axis=0) - [0.0, 0.06, 0.0]) @ normal)
+    assert 0.3 * pressed < sunk < 1.1 * pressed
+
+
+@pytest.mark.slow
+def test_a_finger_presses_on_while_something_falls() -> None:
+    """A block that is let go beside the finger changes nothing for it."""
+    text = (
+        "HAND LEFT BUILTIN\nFRAMES 0 20\nRATE 10\nGRAVITY 0 -9.81 0\nMOVE LEFT 0 0 0.003 0\nMOVE LEFT 20 0 -0.0063 0\n"
+        "OBJECT PLATE BOX 0.036 0.006 0.036 AT 0.034 -0.0275 -0.165\n"
+        "OBJECT TABLE BOX 0.08 0.01 0.08 AT 0.1 -0.1 -0.165\n"
+        "FLESH LEFT INDEX ELEMENT 0.005\nFRICTION 0.6\n{falling}PRESS 0 20 EVERY 5\n"
+    )
+    falling = (
+        "OBJECT CUBE BOX 0.03 0.03 0.03 AT 0.1 -0.02 -0.165\nPHYSICAL CUBE YOUNG 200000 ELEMENT 0.03\n"
+        "POINTS CUBE TOP UPPER Y 0.05\nHOLD CUBE TOP 5\n"
+    )
+    alone, both = (run(text.format(falling=one))[1] for one in ("", falling))
+    assert both.verdict.status == "RELEASED"
+    assert both.frames.tolist() == [5.0, 7.0, 10.0, 15.0, 20.0]
+    assert both.force("LEFT")[-1] == pytest.approx(alone.force("LEFT")[-1], rel=1e-2, abs=1e-3)
+    assert both.force("CUBE")[-1, 1] == pytest.approx(1000.0 * 0.03**3 * 9.81, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_what_is_let_go_slides_off_a_soft_slope() -> None:
+    """With μ = 0.2 it slides off the slab to the floor, which bears it. It has left the slab in its first frames."""
+    _, found = run(SLAB.format(friction=0.2))
+    weight = 1000.0 * 0.03**3 * 9.81
+    assert found.verdict.status == "RELEASED"
+    assert "comes to rest on FLOOR at frame" in found.verdict.text
+    assert found.force("CUBE")[-1] == pytest.approx([0.0, weight, 0.0], rel=1e-3, abs=1e-3 * weight)
+    assert not found.force("SLAB").any()
+    assert found.surfaces.object("CUBE", 35.0)[:, 1].min() == pytest.approx(0.0, abs=1e-4)
 
 
 @pytest.mark.slow

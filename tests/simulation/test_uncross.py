@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 
 from warpjld.simulation.display.smooth import SurfaceSmoother
 from warpjld.simulation.display.uncross import SkinCrossings, uncrossed
+from warpjld.simulation.frames_run import soft_crease
+from warpjld.simulation.specification import ContactSpecification, FleshMaterial
 
 EDGE = 0.15
 MOST = 0.075
+SIDES = (([0, 3, 4, 7], [1, 2, 5, 6]), ([0, 1, 4, 5], [3, 2, 7, 6]), ([0, 1, 2, 3], [4, 5, 6, 7]))
+"""Corners of opposite sides of a hexahedron, along its three edges."""
 
 
 def hose() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
@@ -116,3 +120,30 @@ def test_a_crease_has_no_overlap(joint: str, degrees: float, segments: str, elem
     parted = found.surfaces.separated(12.0)
     assert len(shown.crossings.pairs(parted.vertices["BODY"])) == 0
     assert parted.moved["BODY"] <= found.surfaces.most("BODY")
+
+
+@pytest.mark.slow
+def test_a_knee_bends_to_120_degrees_where_its_flesh_stiffens(tmp_path: Path) -> None:
+    from warpjld.script import Interpreter, Scene
+    from warpjld.script.contact import run_contact
+
+    scene = Scene(say=lambda line: None)
+    Interpreter(scene).run_text(
+        "BODY BUILTIN\nFRAMES 0 12\nJOINT left.knee FLEXION AT 0 0\nJOINT left.knee FLEXION AT 12 120\n"
+        "FLESH BODY left.thigh left.shin ELEMENT 0.02 FLEXION\nPRESS 0 12\n"
+    )
+    found = run_contact(scene, tmp_path)
+    assert found.verdict.status == "CONVERGED"
+    assert found.frames[-1] == 12.0
+    mesh = found.model.body.mesh
+    for moved in found.displacement:  # no element turns inside out at its middle
+        shape = (mesh.nodes + moved)[mesh.elements]
+        edges = [shape[:, high].mean(axis=1) - shape[:, low].mean(axis=1) for low, high in SIDES]
+        assert (np.einsum("ei,ei->e", edges[0], np.cross(edges[1], edges[2])) > 0.0).all()
+
+
+def test_flesh_that_bends_and_hardly_stiffens_is_named() -> None:
+    bends, presses = (FleshMaterial(flexion=bends, stiffening=1.0) for bends in (True, False))
+    assert "flesh of BODY has STIFFENING 1" in soft_crease(ContactSpecification(flesh={"BODY": bends}))
+    assert soft_crease(ContactSpecification(flesh={"BODY": presses})) == ""
+    assert soft_crease(ContactSpecification(flesh={"BODY": FleshMaterial(flexion=True)})) == ""

@@ -13,18 +13,20 @@ from warpjld.simulation.fall.fall_path import fall_summaries
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.fallen import (
     FallenAnimation,
+    dropped_objects,
     fallen_start,
     moved_by,
     released_bodies,
+    standing_objects,
     taking_part,
     without,
 )
-from warpjld.simulation.solve.falling import falling_names, follow_falls
+from warpjld.simulation.solve.falling import Falls, falling_names, follow_falls
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
 from warpjld.simulation.solve_result import SolveResult
 from warpjld.simulation.specification import BondStrength, ContactSpecification, SolveSpecification
 
-__all__ = ["after_contact", "before_contact", "rests_rigidly"]
+__all__ = ["after_contact", "before_contact", "let_go", "rests_rigidly"]
 
 _TRIAL = 1
 """Most halvings of the load step in the trial equilibrium of a fallen body under its weight; without convergence it
@@ -63,10 +65,30 @@ def before_contact(
     return without(specification, outside), stage, replace(moved, falls=(*moved.falls, *found.openings))
 
 
-def after_contact(
-    solved: SolveResult, specification: ContactSpecification, request: SolveSpecification, before: StartFrame
-) -> tuple[StartFrame, SolveResult]:
-    """Let objects fall that the hands no longer hold, if that is why the contact solve ended.
+def let_go(solved: SolveResult, specification: ContactSpecification, request: SolveSpecification) -> Falls | None:
+    """Falls of objects that nothing holds any more, from the last solved frame on; None if there are none.
+
+    That is so where a solve ended for that reason, and where points of objects that touch nothing are held no longer.
+    Other objects stand as they were solved, unless points of them follow the animation.
+    """
+    weights = any(specification.pull) and request.method != "paper"
+    model = solved.model
+    if not weights or model.animation is None:
+        return None
+    first = solved.frames[-1].frame if solved.frames else solved.start
+    held = replace(specification, bonds=_bonds_left(solved, specification))
+    unheld = solved.status in (SolveStatus.UNHELD, SolveStatus.SLIDING)
+    if not unheld and not (solved.converged and dropped_objects(model, solved.frames, held)):
+        return None
+    bodies = released_bodies(model, solved.frames, held, request.rate)
+    if not bodies:
+        return None
+    standing = standing_objects(model, solved.frames, bodies)
+    return follow_falls(model.animation, held, request, list(bodies), released=bodies, standing=standing, first=first)
+
+
+def after_contact(solved: SolveResult, before: StartFrame) -> tuple[StartFrame, SolveResult]:
+    """Add what fell during the contact solve, or after it where it could not go on.
 
     Returns:
         The start frame extended by the falls, and the result with ``released`` set; both unchanged if nothing
@@ -74,26 +96,18 @@ def after_contact(
     """
     if before.interrupted is not None:
         return before, _stopped(solved, before.interrupted)
-    weights = any(specification.pull) and request.method != "paper"
-    if solved.status not in (SolveStatus.UNHELD, SolveStatus.SLIDING) or not weights or solved.model.animation is None:
-        return before, solved
-    first = solved.frames[-1].frame if solved.frames else solved.start
-    held = _bonds_left(solved, specification)
-    bodies = released_bodies(solved.model, solved.frames, replace(specification, bonds=held), request.rate)
-    if not bodies:
-        return before, solved
-    known = (solved.model.animation, replace(specification, bonds=held), request, list(bodies))
-    found = follow_falls(*known, released=bodies, first=first)
-    paths = found.paths
-    if not any(path.summary() for path in paths.values()):
-        return before, solved
-    moved = dict(before.moved)
-    for name, path in paths.items():
-        frames, places = moved.get(name, ([], []))
-        moved[name] = ([*frames, *path.frames], [*places, *path.places])
-    falls = (*before.falls, *fall_summaries(paths.values()), *found.openings)
-    solved = replace(solved, released=first)
-    return replace(before, moved=moved, falls=falls), _stopped(solved, found.interrupted)
+    found = [*solved.falls, *([] if solved.unsolved is None else [solved.unsolved])]
+    found = [falls for falls in found if any(path.summary() for path in falls.paths.values())]
+    moved, said = dict(before.moved), list(before.falls)
+    for falls in found:
+        for name, path in falls.paths.items():
+            frames, places = moved.get(name, ([], []))
+            moved[name] = ([*frames, *path.frames], [*places, *path.places])
+        said += [*fall_summaries(falls.paths.values()), *falls.openings]
+    if found and solved.released is None:
+        solved = replace(solved, released=min(path.frames[0] for path in found[0].paths.values()))
+    stopped = None if solved.unsolved is None else solved.unsolved.interrupted
+    return replace(before, moved=moved, falls=tuple(said)), _stopped(solved, stopped)
 
 
 def _stopped(solved: SolveResult, after: float | None) -> SolveResult:

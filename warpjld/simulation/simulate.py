@@ -40,7 +40,7 @@ from warpjld.simulation.bodies.skin_obstacle import bystanders
 from warpjld.simulation.display.solved_surfaces import surfaces_of_frames, view_of_frames
 from warpjld.simulation.display.surfaces import DeformedSurfaces
 from warpjld.simulation.display.visible_pressure import VisiblePressure
-from warpjld.simulation.free_fall import after_contact, before_contact, rests_rigidly
+from warpjld.simulation.free_fall import after_contact, before_contact, let_go, rests_rigidly
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.found import FoundGrip
 from warpjld.simulation.report.parted import parted_notes
@@ -266,9 +266,8 @@ def simulate(
     frames = [] if before.interrupted is not None else _frames(specification, request, model.start)
     if rigid := rests_rigidly(model, before, frames):
         frames, before = [], replace(before, falls=(*before.falls, rigid))
-    checkpoint = CheckpointFile(
-        folder / (request.state or KEPT), cache(partial(identity_of, model, specification, frames))
-    )
+    identity = cache(partial(identity_of, model, specification, frames))
+    checkpoint = CheckpointFile(folder / (request.state or KEPT), identity)
     with warning_texts(ContactWarning, MaterialWarning) as warned:
         solved = solve_frames(
             model,
@@ -276,11 +275,12 @@ def simulate(
             specification,
             request,
             watch=watch,
+            falling=lambda ended: let_go(ended, specification, request),
             checkpoint=None if request.state is None else checkpoint,
             saving=lambda save: keeping(lambda: checkpoint.path if save(checkpoint) else None),
             progress=progress,
         )
-    before, solved = after_contact(solved, specification, request, before)
+    before, solved = after_contact(solved, before)
     return _report(solved, before, table, request, notes)
 
 
@@ -298,23 +298,23 @@ def _model(
         for name in specification.physical
     ]
     notes += [f"{one.name}: {note}" for one in objects for note in one.notes]
-    rigid = [name for name in animation.objects if name not in specification.physical]
-    obstacles = {name: animation.objects[name].obstacle(start) for name in rigid}
+    rigid = {name: one for name, one in animation.objects.items() if name not in specification.physical}
+    obstacles = {name: one.obstacle(start) for name, one in rigid.items()}
     request = specification.pressing
     assert request is not None
-    frames = [float(frame) for frame in range(request.first, request.last + 1)]
-    free = bool(specification.physical)
-    obstacles |= bystanders(dict(animation.actors), set(specification.flesh), frames, free, start)
+    frames = list(map(float, range(request.first, request.last + 1)))
+    obstacles |= bystanders(dict(animation.actors), set(specification.flesh), frames, bool(objects), start)
     model = assemble_model(hands, objects, obstacles, specification, start=start, animation=animation)
     check_model(model, specification)
     return model, notes
 
 
 def _frames(specification: ContactSpecification, request: SolveSpecification, start: float) -> list[float]:
-    """Frames to solve, ascending: every ``request.every``-th, the last, and those at which a grip begins or ends."""
+    """Frames to solve, ascending: every ``request.every``-th, the last, and those at which a grip or a hold changes."""
     frames = {float(f) for f in range(request.first, request.last + 1, request.every)} | {float(request.last)}
     for grip in specification.grips:
         frames |= {grip.first, grip.middle, grip.last}
+    frames |= {one.until for one in specification.prescribed.values() if one.held and one.until < request.last}
     return sorted(f for f in frames if f > start)
 
 

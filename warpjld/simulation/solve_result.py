@@ -13,6 +13,7 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.found import FoundGrip
 from warpjld.simulation.solve.bone_clearance import TightBone
 from warpjld.simulation.solve.corrected_digit import CorrectedDigit
+from warpjld.simulation.solve.falling import Falls
 from warpjld.simulation.solve.force_limit import Stop
 from warpjld.simulation.solve.missed_contacts import MissedContact
 from warpjld.simulation.solve.solved_frame import SolvedFrame
@@ -53,7 +54,9 @@ class SolveResult:
         stops: Digits that stopped at their force limit.
         tight: Frame and smallest clearance between bone and object, by actor, digit and object.
         equilibria: Equilibrium of each frame that this run solved, by frame number, for differentiation.
-        released: Frame from which on unheld objects fall and contact is no longer solved; None if there is none.
+        released: Frame from which on unheld objects fall; None if there is none.
+        falls: Falls of objects that were let go while contact was solved, in order.
+        unsolved: Falls after which contact is not solved; None if it is solved to the end.
         interrupted: Whether Ctrl-C ended the run.
     """
 
@@ -71,7 +74,14 @@ class SolveResult:
     tight: tuple[tuple[float, TightBone], ...] = ()
     equilibria: Mapping[float, KnownEquilibrium] = field(default_factory=dict)
     released: float | None = None
+    falls: tuple[Falls, ...] = ()
+    unsolved: Falls | None = None
     interrupted: bool = False
+
+    @property
+    def converged(self) -> bool:
+        """Whether all frames so far are solved."""
+        return self.status is SolveStatus.CONVERGED
 
     @property
     def start(self) -> float:

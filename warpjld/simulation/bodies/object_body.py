@@ -23,10 +23,29 @@ from warpjld.simulation.bodies.support import ObjectSupport
 from warpjld.simulation.specification import ContactSpecification, GripSpecification, located
 from warpjld.simulation.state_variables import Points, PrescribedPoints
 
-__all__ = ["ObjectBody", "build_object_body", "object_body"]
+__all__ = ["ObjectBody", "RigidFall", "build_object_body", "object_body"]
 
 _FOOT = 0.05
 """Lowest share of a lifted object's height; the points in it support the object until it is lifted."""
+
+
+@dataclass(frozen=True, eq=False)
+class RigidFall:
+    """Rigid motion of an object that was let go, known from its integration as a rigid body.
+
+    Attributes:
+        place: Placement at a time (a batch of one).
+        begins: Time at which it is let go.
+        ends: Time from which on it is free again, at rest; infinite: it never rests.
+    """
+
+    place: Callable[[float], Places]
+    begins: float
+    ends: float
+
+    def moves(self, time: float) -> bool:
+        """Whether the object follows this fall at a time."""
+        return self.begins + 1e-9 < time <= self.ends + 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,6 +61,7 @@ class ObjectBody(DeformableBody):
         other: Dirichlet conditions at a time that replace those of states and support, for branches; None: none.
         notes: Messages about its mesh.
         loads: External loads on it.
+        falls: Times at which it was let go and moves rigidly, ascending.
     """
 
     local: NDArray[np.float64]
@@ -52,6 +72,7 @@ class ObjectBody(DeformableBody):
     other: Callable[[float], Prescribed] | None = None
     notes: tuple[str, ...] = ()
     loads: AppliedLoads | None = None
+    falls: tuple[RigidFall, ...] = ()
 
     def deformed(
         self, displacement: NDArray[np.float64], covered: NDArray[np.floating] | None = None
@@ -63,6 +84,14 @@ class ObjectBody(DeformableBody):
         """Whether the points of a state variable follow the object's placement at a time."""
         stands = self.support is None or self.support.stands(time)
         return self.other is None and stands and state.holds(self.start + time)
+
+    def falling(self, time: float) -> RigidFall | None:
+        """The fall that moves it at a time; None if it does not fall then."""
+        return next((fall for fall in self.falls if fall.moves(time)), None)
+
+    def carried_by(self, fall: RigidFall, time: float) -> NDArray[np.float64]:
+        """Displacement of its nodes at a time of a fall, in which it is rigid [m], shape (N, 3)."""
+        return np.asarray(fall.place(time).apply(self.local)[0] - self.mesh.nodes)
 
     @property
     def _led(self) -> bool:
@@ -81,6 +110,8 @@ class ObjectBody(DeformableBody):
         """Dirichlet conditions of its prescribed points (R128)."""
         if self.other is not None:
             return self.other(time)
+        if (fall := self.falling(time)) is not None:
+            return Prescribed(np.arange(3 * len(self.local)), self.carried_by(fall, time).ravel())
         out = Prescribed(np.empty(0, np.int64), np.empty(0))
         frame = self.start + time
         for state, nodes in self.states:
@@ -122,6 +153,8 @@ class ObjectBody(DeformableBody):
     ) -> list[NDArray[np.float64]]:
         """Current and predicted positions of nodes [m]."""
         x = self.mesh.nodes[nodes] + displacement[nodes]
+        if (fall := self.falling(times[-1])) is not None:
+            return [x, *(fall.place(t).apply(self.local[nodes])[0] for t in times[1:])]
         if not self._held(times[-1]):
             return [x for _ in times]  # the motion of a free object is not known in advance
         local = self.place(times[0]).to_local(x)[0]
@@ -131,6 +164,13 @@ class ObjectBody(DeformableBody):
         """A copy placed at ``time`` as this object is at ``clock(time)``."""
         place = self.place
         return replace(self, place=lambda time: place(clock(time)))
+
+    def let_go(self, animation: ObjectAnimation, begins: float, ends: float) -> Self:
+        """A copy that nothing holds any more: it follows an animation rigidly from one time to another, and is free
+        after that."""
+        place = _place_at(animation, self.start)
+        falls = (*self.falls, RigidFall(place, begins, ends))
+        return replace(self, place=place, states=(), support=None, falls=falls)
 
     def driven(self, animation: ObjectAnimation) -> Self:
         """A copy driven by another animation of the object."""

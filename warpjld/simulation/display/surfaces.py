@@ -187,7 +187,14 @@ class DeformedSurfaces:
         return np.concatenate([at_rest, *(f.displacement[None] for f in self.frames)])
 
     def _displacement(self, frame: float) -> NDArray[np.float64] | None:
-        return self._between(self._displacements, frame)
+        """Displacements of all nodes at a frame: of what falls along its path, else linear between solved frames."""
+        moved, time = self._between(self._displacements, frame), frame - self.model.start
+        if moved is None:
+            return None
+        for one in self.model.objects:
+            if (fall := one.falling(time)) is not None:
+                moved[self.model.spans[one.name]] = one.carried_by(fall, time)
+        return moved
 
     def _between(self, values: NDArray[np.float64], frame: float) -> NDArray[np.float64] | None:
         """Values at a frame, linear between solved frames; None outside them."""

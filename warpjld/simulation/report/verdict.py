@@ -93,30 +93,17 @@ def verdict_of(
         overlaps: Overlaps that contact should have removed, deepest first.
     """
     frames = (solved.frames[0].frame, solved.frames[-1].frame) if solved.frames else None
-    lines = []
-    most: dict[tuple[str, str], ContactRow] = {}
-    for row in rows:
-        best = most.get((row.actor, row.digit))
-        if row.force_n > 1e-9 and (best is None or row.force_n > best.force_n):
-            most[row.actor, row.digit] = row
-    for (actor, digit), row in most.items():
-        line = (
-            f"{actor} {digit}: {row.force_n:.3g} N against {row.against} at frame {row.frame:g}, "
-            f"{row.area_mm2:.3g} mm², peak {row.peak_kpa:.3g} kPa, {row.state}"
-        )
-        if not np.isnan(row.share):
-            line += (
-                f"; bones bear {row.bone_n:.3g} N of {row.limit_n:.3g} N, {100 * row.share:.0f} % of what muscles can"
-            )
-        lines.append(line)
+    lines = _digit_lines(rows)
     over = [row for row in rows if row.share > 1.0]
     crushed = max((row for row in rows if 1e3 * row.peak_kpa > CRUSHING), key=lambda row: row.peak_kpa, default=None)
     last = balances(solved.model, solved.frames[-1]) if solved.frames else []
     touched = any(row.force_n > 0.0 for row in rows)
     status = solved.status.name
-    if solved.released is not None:
+    if solved.released is not None and solved.unsolved is not None:
         status = RELEASED
-        text = f"not held: {solved.message}; contact is not solved after frame {solved.released:g}"
+        text = (
+            f"not held: {solved.message}; contact is not solved after frame {frames[1] if frames else solved.start:g}"
+        )
     elif solved.status not in (SolveStatus.CONVERGED, SolveStatus.STOPPED):
         text = f"no equilibrium: {solved.message}"
     elif overlaps:
@@ -134,6 +121,9 @@ def verdict_of(
         text = f"not realistic: at frame {worst.frame:g} {worst.digit} needs {need}"
     elif solved.status is SolveStatus.STOPPED:
         text = solved.message
+    elif solved.released is not None:
+        status = RELEASED
+        text = f"not held: nothing holds {solved.falls[0].listed} from frame {solved.released:g} on"
     elif not rows:
         text = "solved"
     elif lost := _lost(solved):
@@ -152,6 +142,27 @@ def verdict_of(
     balance, stops = tuple(one.text for one in last), _stops(solved, rows)
     said, openings = tuple(one.text for one in suggestions), tuple(one for one in suggestions if one.joint)
     return ContactVerdict(status, text, tuple(lines), said, frames, balance=balance, stops=stops, openings=openings)
+
+
+def _digit_lines(rows: Sequence[ContactRow]) -> list[str]:
+    """Messages about the largest force on each digit."""
+    lines = []
+    most: dict[tuple[str, str], ContactRow] = {}
+    for row in rows:
+        best = most.get((row.actor, row.digit))
+        if row.force_n > 1e-9 and (best is None or row.force_n > best.force_n):
+            most[row.actor, row.digit] = row
+    for (actor, digit), row in most.items():
+        line = (
+            f"{actor} {digit}: {row.force_n:.3g} N against {row.against} at frame {row.frame:g}, "
+            f"{row.area_mm2:.3g} mm², peak {row.peak_kpa:.3g} kPa, {row.state}"
+        )
+        if not np.isnan(row.share):
+            line += (
+                f"; bones bear {row.bone_n:.3g} N of {row.limit_n:.3g} N, {100 * row.share:.0f} % of what muscles can"
+            )
+        lines.append(line)
+    return lines
 
 
 def _lost(solved: SolveResult) -> str:

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpjld.fem.contact import Obstacle
+from warpjld.fem.contact.obstacles.meshes import RigidMesh
 from warpjld.grasp import GraspObject, Places
 from warpjld.simulation.animation import ActorAnimation, AngleEdit, Animation, ObjectAnimation
+from warpjld.simulation.bodies.absent_obstacle import AbsentObstacle
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
@@ -26,7 +28,19 @@ from warpjld.simulation.specification import ContactSpecification
 if TYPE_CHECKING:
     from warpjld.simulation.solve.start_frame import StartFrame
 
-__all__ = ["FallenAnimation", "FallenObject", "fallen_start", "moved_by", "released_bodies", "taking_part", "without"]
+__all__ = [
+    "FallenAnimation",
+    "FallenObject",
+    "dropped_objects",
+    "fallen_start",
+    "falling_model",
+    "moved_by",
+    "released_bodies",
+    "rest_frames",
+    "standing_objects",
+    "taking_part",
+    "without",
+]
 
 _NEXT = 1.0
 """Frames after the last solved one at which an object with Dirichlet conditions counts as held."""
@@ -130,6 +144,84 @@ def released_bodies(
             body.spin = _turned(placed[group[0]][1]).as_rotvec() / length
         out |= dict.fromkeys(group, body)
     return out
+
+
+def dropped_objects(model: ContactModel, frames: Sequence[SolvedFrame], contact: ContactSpecification) -> list[str]:
+    """Objects whose points were held at the last solved frame, are free after it, and which touched nothing there.
+
+    They fall whatever friction is. Bonded objects are dropped together or not at all.
+    """
+    if not frames:
+        return []
+    last, held, free = frames[-1], set(), set()
+    time = last.frame - model.start
+    for one in model.objects:
+        known, ahead = (len(one.prescribed(at, History()).degrees) > 0 for at in (time, time + _NEXT))
+        held |= {one.name} if known and one.falling(time) is None else set()
+        free |= {one.name} if not ahead and contact.physical[one.name].density > 0.0 else set()
+    touched = {
+        name
+        for owner, forces in zip(model.owners, last.nodal, strict=True)
+        for name in (owner.slave, owner.master)
+        if name in free and owner.other(name) not in free and forces[model.spans[name]].any()
+    }
+    groups = bonded_groups([one.name for one in model.objects], contact.bonds)
+    dropped = [group for group in groups if free.issuperset(group) and held & {*group} and not touched & {*group}]
+    return [name for group in dropped for name in group]
+
+
+def standing_objects(
+    model: ContactModel, frames: Sequence[SolvedFrame], falling: Mapping[str, RigidBody]
+) -> dict[str, Obstacle]:
+    """Objects that do not fall, as they were solved last; those of which points follow the animation are left out."""
+    now = (frames[-1].frame if frames else model.start) + _NEXT - model.start
+    out: dict[str, Obstacle] = {}
+    for one in model.objects if frames else ():
+        if one.name not in falling and not any(one.holds(state, now) for state, _ in one.states):
+            out[one.name] = RigidMesh(one.deformed(frames[-1].displacement[model.spans[one.name]]), one.triangles)
+    return out
+
+
+def falling_model(model: ContactModel, paths: Mapping[str, FallPath]) -> ContactModel:
+    """The model in which objects that were let go follow their paths until they rest, and are free from then on.
+
+    Until then they are rigid and push what deforms; obstacles, which their paths avoid already, do not push them.
+    Objects that stay where they are, are left as they are.
+    """
+    assert model.animation is not None
+    paths = {name: path for name, path in paths.items() if path.summary()}
+    animation = FallenAnimation(model.animation, paths)
+    times = {name: (path.frames[0] - model.start, _free_from(path) - model.start) for name, path in paths.items()}
+    objects = [
+        one.let_go(animation.objects[one.name], *times[one.name]) if one.name in paths else one for one in model.objects
+    ]
+    pairs = [
+        replace(pair, master=AbsentObstacle(pair.master, *times[owner.slave]))
+        if owner.slave in paths and isinstance(pair.master, Obstacle)
+        else pair
+        for pair, owner in zip(model.pairs, model.owners, strict=True)
+    ]
+    return replace(model, objects=tuple(objects), pairs=tuple(pairs), animation=animation)
+
+
+def _free_from(path: FallPath) -> float:
+    """Frame from which on a fallen object is in equilibrium; infinite if it is not."""
+    return np.inf if path.rests is None or path.left is not None else path.rests
+
+
+def rest_frames(model: ContactModel, paths: Mapping[str, FallPath], last: float) -> list[float]:
+    """Frames up to ``last`` at which objects that were let go come to rest, ascending; empty if contact cannot go on
+    after the falls.
+
+    It cannot where everything stays where it was let go, so that nothing has changed; and there is no need where
+    nothing else deforms, and nothing comes to rest.
+    """
+    paths = {name: path for name, path in paths.items() if path.summary()}
+    if not paths:
+        return []
+    found = sorted({end for path in paths.values() if (end := _free_from(path)) <= last})
+    others = model.hands or any(one.name not in paths for one in model.objects)
+    return found or ([last] if others else [])
 
 
 def _turned(places: Sequence[Places]) -> Rotation:

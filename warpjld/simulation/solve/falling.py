@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from warpjld.fem.contact import Obstacle
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.fall.bonded import bonded_groups
 from warpjld.simulation.fall.fall_path import FallPath
@@ -38,6 +39,11 @@ class Falls:
     openings: tuple[str, ...] = ()
     interrupted: float | None = None
 
+    @property
+    def listed(self) -> str:
+        """``'BAR_1' and 'BAR_2'``: the names of what moves."""
+        return " and ".join(f"'{name}'" for name, path in self.paths.items() if path.summary())
+
 
 def falling_names(contact: ContactSpecification, request: SolveSpecification) -> list[str]:
     """Deformable objects with weight that neither Dirichlet conditions, loads, a grip that lifts them, nor an object
@@ -59,6 +65,7 @@ def follow_falls(
     names: Sequence[str],
     *,
     released: Mapping[str, RigidBody] | None = None,
+    standing: Mapping[str, Obstacle] | None = None,
     first: float | None = None,
 ) -> Falls:
     """Falls of free objects, each until the last frame or until hands hold it.
@@ -70,10 +77,12 @@ def follow_falls(
         names: Names of the free objects.
         released: Rigid bodies at the ``first`` frame, for objects that hands have released; hands then no longer hold
             them.
+        standing: Other objects that stand elsewhere than in the animation, or deformed.
         first: First frame; by default the request's.
     """
     start = float(request.first) if first is None else first
-    stage = FallingStage(animation, replace(contact, bonds=list(contact.bonds)), request, start, bool(released))
+    bonds = list(contact.bonds)
+    stage = FallingStage(animation, replace(contact, bonds=bonds), request, start, bool(released), standing or {})
     for body in _released(released) if released else []:
         stage.add(body)
     for group in [] if released else bonded_groups(names, contact.bonds):

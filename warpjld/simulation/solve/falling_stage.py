@@ -45,6 +45,7 @@ class FallingStage:
         request: Frames and frame rate.
         start: First frame.
         released: Whether hands have released the bodies, and no longer hold them.
+        standing: Objects that stand elsewhere than in the animation, or deformed, by name.
         bodies: Bodies that fall, rest or move.
         paths: Paths of their objects by name.
         openings: Messages about impacts.
@@ -56,6 +57,7 @@ class FallingStage:
     request: SolveSpecification
     start: float
     released: bool = False
+    standing: Mapping[str, Obstacle] = field(default_factory=dict)
     bodies: list[RigidBody] = field(default_factory=list)
     paths: dict[str, FallPath] = field(default_factory=dict)
     openings: list[str] = field(default_factory=list)
@@ -81,7 +83,7 @@ class FallingStage:
         last whole frame, if there is one."""
         solids = {
             name: one.obstacle(self.start) for name, one in self.animation.objects.items() if name not in self.paths
-        }
+        } | dict(self.standing)
         self._hold(self.start, solids)
         frame, known = self.start, self._known()
         try:
@@ -199,7 +201,7 @@ class FallingStage:
         """An obstacle of the stage with its times from another frame."""
         if name in self.animation.actors:
             return SkinObstacle(self.animation.actors[name], start)
-        if name not in self.animation.objects or name in self.paths:
+        if name not in self.animation.objects or name in self.paths or name in self.standing:
             return solid
         one = self.animation.objects[name]
         # an impact asks for the same times again and again

@@ -161,7 +161,8 @@ class Mortar:
         slave = self.slave
         share = integrals[:, :16].reshape(-1, 4, 4).sum(axis=2)
         sides = [unit(side.area_vectors(x)[pairs[:, k]]) for k, side in enumerate((slave, self.master))]
-        return FacingParts.of(slave.corners[pairs[:, 0]], len(slave.nodes), share, sides[0], sides[1]).normals
+        where = slave.corners[pairs[:, 0]].astype(np.int64)
+        return FacingParts.of(where, len(slave.nodes), share, sides[0], sides[1]).normals
 
     def met_by(self, label: int) -> Mask:
         """Mask of the master facets that slave facets of a label may touch, shape (G,)."""
