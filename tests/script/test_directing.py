@@ -112,6 +112,7 @@ def test_an_actor_has_its_colour(hands: dict[str, Rig]) -> None:
         ("SHOT A 0 3\nSHOT A 4 5", "a shot A already"),
         ("SHOT A 0 5\nSHOT B 3 8\nFILM 'a.mp4' SHOTS A B", "shot B begins at frame 3, before A has ended"),
         ("FILM 'a.mp4' SHOTS A", "SHOTS needs names of shots; there are none"),
+        ("SHOT A 0 5\nFILM 'a.mp4' SHOTS A B", r"a shot \(A\) or the style \(SHADED/WIREFRAME/PRESSURE\), found B"),
         ("LIGHT A SPOT FROM 0 0 1", "the kind of lamp"),
         ("LIGHT A KEY FROM 0 0 0", "cannot shine at its own place"),
         ("BACKDROP 'octarine'", "no colour 'octarine'"),

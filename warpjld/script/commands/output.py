@@ -134,6 +134,9 @@ def _shots(scene: Scene, arguments: Arguments) -> tuple[Shot, ...]:
     if not out:
         known = ", ".join(scene.shots) or "none"
         raise arguments.error(f"SHOTS needs names of shots; there are {known}: SHOT <name> <first> <last> makes one")
+    after = arguments.next_word()
+    if after is not None and after.upper() not in _STYLES:
+        raise arguments.expected(f"a shot ({'/'.join(scene.shots)}) or the style ({'/'.join(_STYLES)})")
     return tuple(out)
 
 

@@ -198,7 +198,13 @@ def build_flesh_body(actor: ActorAnimation, material: FleshMaterial, start: floa
         notes.append(f"{actor.name}: the volume stays up to {1e3 * gap:.1f} mm off the skin where it folds")
     built = flesh.built
     if part is None:
-        shape = cut_to_digits(flesh.hand, poses, skin, material.digits)
+        try:
+            shape = cut_to_digits(flesh.hand, poses, skin, material.digits)
+        except InputError as error:
+            file = (
+                "" if material.bones is None else f": want some in {material.bones.name}, in the rig's units and axes"
+            )
+            raise located(InputError(f"{error.message}{file}"), material.where) from error
     else:
         ends, built, hand = part.ends(built, element), part.widened(built), part.widened(flesh.hand)
         shape = cut_to_bones(hand, poses, skin, part.bones(hand), part.share, ends)

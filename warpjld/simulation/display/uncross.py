@@ -98,7 +98,7 @@ def uncrossed(
         skin: The skin.
         at: Its vertices [m], shape (V, 3).
         sound: Positions that folds return to, each tried in turn [m], shape (V, 3).
-        most: Largest retreat of a vertex [m]; what crosses beyond it still does.
+        most: Largest displacement of a vertex [m]; what crosses beyond it still does.
     """
     pairs = skin.pairs(at)
     for goal in sound:
@@ -128,6 +128,8 @@ def _drawn_back(
             back = np.minimum(1.0, back + _RETURN * skin.around(folds))
         out = at + retreat[:, None] * inward
         out += back[:, None] * (sound - out)
+        length = np.linalg.norm(out - at, axis=1, keepdims=True)
+        out = at + (out - at) * np.minimum(1.0, most / np.maximum(length, 1e-300))
         pairs = skin.pairs(out)
         if len(pairs) < len(fewest):
             best, fewest = out, pairs

@@ -172,7 +172,9 @@ def _check_expected(skeleton: Skeleton, vertices: NDArray[np.float64], faces: ND
             reach = first_hits(vertices, faces, np.repeat(place[None], 6, axis=0), rays)
             a, b = reach[:3], reach[3:]
             known = np.isfinite(a) & np.isfinite(b)
-            return float(np.mean(np.where(known, np.abs(a - b) / np.where(known, a + b, 1.0), 1.0)))
+            share = np.ones(3)
+            share[known] = np.abs(a[known] - b[known]) / (a[known] + b[known])
+            return float(share.mean())
 
         found += body_expectations(joints, up, float(np.ptp(high)), float(high.min()), uneven)
     return [
