@@ -16,7 +16,8 @@ solved (else the solver's status); no pressure is above 1 MPa (``crushed``); no 
 (``muscles``); something is touched (``untouched``); no object is left with a net force of the hand above a third of
 what presses on it, and above what it would weigh if it were of water (``unbalanced``). ``newton``: linear solves of the
 searches that found an equilibrium, mean and 90th percentile; ``lost``: those of searches in vain; ``seconds``:
-processor time of the contact solve.
+processor time of the contact solve; ``grip``: how the search for a grip ended. A ``force`` that is not reached because
+nothing opposes more (``UNOPPOSED``) may end plausibly: with less.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ DEFORMABLE = ("ball", "can", "lemon")
 TASKS = ("squeeze", "force", "lift")
 COLUMNS = (
     *("hand", "object", "task", "end", "detail", "frames", "of", "newton", "newton90", "steps", "lost", "solves"),
-    *("seconds", "most_n", "peak_kpa", "share", "net_n", "sum_n"),
+    *("seconds", "most_n", "peak_kpa", "share", "net_n", "sum_n", "grip"),
 )
 LAST = 30
 UNBALANCED = 1.0 / 3.0
@@ -187,6 +188,7 @@ def judged(found: Any) -> dict[str, Any]:
         "share": round(max(finite, default=0.0), 3),
         "net_n": round(net, 2),
         "sum_n": round(total, 2),
+        "grip": ", ".join(grip.status for grip in found.solved.grips),
     }
     status = found.solved.status.name
     if status != "CONVERGED":
@@ -304,7 +306,7 @@ def table(rows: list[dict[str, Any]]) -> str:
     """Markdown, with the share that ends plausibly."""
     shown = [c for c in COLUMNS if c != "detail"]
     out = ["| " + " | ".join(shown) + " |", "|" + "---|" * len(shown)]
-    out += ["| " + " | ".join(str(row[c]) for c in shown) + " |" for row in rows]
+    out += ["| " + " | ".join(str(row.get(c, "")) for c in shown) + " |" for row in rows]
     good = sum(row["end"] == "plausible" for row in rows)
     return "\n".join([*out, "", f"{good} of {len(rows)} end plausibly"])
 

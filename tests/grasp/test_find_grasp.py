@@ -137,6 +137,32 @@ def test_a_verdict_knows_which_contacts_press(covering) -> None:
     assert (verdict.closed, verdict.digits, verdict.palm, verdict.score) == (False, (), False, 0.0)
 
 
+def test_a_contact_counts_as_much_as_closing_presses_it(covering) -> None:
+    """Against the way that the nearest segment really goes as all joints of its digit flex by a little."""
+    thing, skeleton = ball(0.06), covering.skeleton
+    closer = Closer(covering, thing)
+    found = find_grasp(covering, thing, closer=closer, count=8, seed=1)
+    closed = found.poses(skeleton)
+    chains, angles = digit_chains(skeleton), found.angles.copy()
+    angles[np.concatenate(list(chains.values())), FLEXION] += 1e-4
+    after = replace(found, angles=angles).poses(skeleton)
+    (pressing,) = Judge(closer.both, "left", 0.6).pressing(closed, covering.deform(closed), after)
+    skins = [covering.deform(poses)[0].astype(np.float64) for poses in (closed, after)]
+    cosines = []
+    for point, normal in zip(pressing.contacts.points, pressing.contacts.normals, strict=True):
+        ways = (skins[1] - skins[0])[np.linalg.norm(skins[0] - point, axis=1) < 0.006]  # skin near the contact
+        cosines.append(float((ways @ normal / np.linalg.norm(ways, axis=1)).mean()))
+    straight = pressing.straight
+    assert len(straight) == len(pressing.contacts) >= 4
+    of_digits = straight[:-1] if pressing.palm else straight  # the palm comes last
+    apart = np.abs(np.maximum(cosines[: len(of_digits)], 0.0) - of_digits)
+    assert np.median(apart) < 0.05  # skin is not rigid on its bone
+    assert apart.max() < 0.1
+    assert (straight[len(of_digits) :] == 1.0).all()
+    assert 0.0 < found.verdict.tightening < found.verdict.epsilon
+    assert found.verdict.firmness == pytest.approx(found.verdict.tightening + 0.01 * len(found.verdict.digits))
+
+
 def test_a_hand_does_not_reach_through_the_table(covering) -> None:
     """A ball on a table is taken from above; without the table it may be taken from anywhere."""
     thing, table = ball(0.06, subdivisions=3), box(0.4, 0.02, 0.4, name="table").placed((0.0, -0.04, 0.0))

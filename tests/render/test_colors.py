@@ -30,6 +30,20 @@ def test_bar_leaves_the_left_of_the_picture_alone() -> None:
     assert (picture == 250).all()
 
 
+@pytest.mark.parametrize("size", [(640, 480), (960, 720), (600, 900)])
+@pytest.mark.parametrize("high", [5.0, 281_400.0])
+def test_the_bar_covers_nothing_beside_its_room(size: tuple[int, int], high: float) -> None:
+    """But for the title, which stands above the bar."""
+    picture = np.full((size[1], size[0], 3), 250, np.uint8)
+    drawn = ColorScale.of_pressure(high).drawn_on(picture, "#000000")
+    width, height = ColorScale.room_beside(size)
+    right, below = (size[0] + width) // 2, round(0.24 * size[1])
+    assert height == size[1]
+    np.testing.assert_array_equal(drawn[below:, :right], 250)
+    assert (drawn[below:, right:-1] != 250).any()
+    np.testing.assert_array_equal(drawn[below:, -1], 250)  # numbers are not cut
+
+
 def test_refuses() -> None:
     with pytest.raises(InputError, match="low < high"):
         ColorScale(1, 1)

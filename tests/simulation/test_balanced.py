@@ -74,3 +74,23 @@ def test_a_force_that_is_asked_for_is_balanced() -> None:
     assert box.pressing == pytest.approx(4.0, rel=0.06)
     assert not box.unbalanced
     assert box.net < 0.25 * box.pressing
+
+
+@pytest.mark.slow
+def test_a_force_that_nothing_opposes_is_not_reached() -> None:
+    """Two fingers press a box against a thumb without flesh, which touches nothing: at most as hard as it is heavy."""
+    scene = Scene(say=lambda line: None)
+    Interpreter(scene).run_text(
+        "HAND LEFT BUILTIN\nOBJECT BOX BOX 0.05 0.08 0.05 AT 0 0 0\nFRAMES 0 30\nSPLINE 1\n"
+        "GRASP 0 24 LEFT BOX AUTO TRIES 8\nSQUEEZE 24 30 LEFT FORCE 4\nFLESH LEFT INDEX MIDDLE ELEMENT 0.006\n"
+        "PRESS 20 30 EVERY 2"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        found = run_contact(scene, Path(folder)).solved
+    grip = found.grips[0]
+    assert grip.status == "UNOPPOSED"
+    assert "nothing opposes more" in grip.text
+    assert 1.0 < grip.force < 3.0
+    box = next(one for one in balances(found.model, found.frames[-1]) if one.object == "BOX")
+    assert box.net <= 1.1 * box.weight  # the last frame is solved anew
+    assert [row["chosen"] for row in grip.rows].count(1) == 1

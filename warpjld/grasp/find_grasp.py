@@ -30,8 +30,9 @@ _ROUND = 32  # placements per round (batch)
 _FINALISTS = 6  # placements of a round that are closed and judged in full
 _DEEPEST = 6e-4  # largest penetration of hand and object in a grasp that is accepted [m]
 _PRESSED = 3e-4  # penetration above which an open hand is moved back along its approach [m]
-_GOOD = 0.12  # score at which the search may end early [N]
+_GOOD = 0.12  # firmness at which the search may end early [N]
 _AS_WELL = 0.95  # score over that before idle fingers open, above which the grasp counts as one that holds as well
+_LITTLE = 1e-4  # flexion of all joints that tells how closing moves contacts [rad]
 _FOLLOWS = (0.5, 0.25, 0.0)  # flexion of a finger that takes no part, over that of the finger beside it, tried in turn
 _OTHERS = ("plate", "cylinder", "sphere", "pinch")  # further postures, tried in turn while nothing is found
 _CLOSES = (0.0, 0.25, 0.5, 0.75, 1.0)  # fractions of the closing motion at which collisions are tested
@@ -111,8 +112,9 @@ def find_grasp(
     Placements are processed in rounds of 32. All are closed roughly and ranked by the force closure of contacts within
     2.5 mm. The best six are closed in full, digits stopping at the object, and judged (``Judge``); for those that could
     become the best, digits are then also kept from passing through one another. A grasp that is not force closed, or
-    has more than 0.6 mm of penetration, is refused; of the others the one with the best score is kept. The search ends
-    after a round in which a grasp has a score of 0.12 N and uses all digits but one (all digits, for a pinch), or, with
+    has more than 0.6 mm of penetration, is refused; of the others the one with the best firmness is kept, which counts
+    of every contact what closing presses it: a thumb that slides past an object opposes nothing. The search ends after
+    a round in which a grasp has a firmness of 0.12 N and uses all digits but one (all digits, for a pinch), or, with
     any grasp, once half of the placements are tried. Fingers that touch nothing are then bent by those beside them.
 
     Obstacles may be penetrated by 0.1 mm at most: by the open hand on the last 12 cm of its approach, and by the digits
@@ -169,15 +171,15 @@ def find_grasp(
         tried += len(hands)
         finalists = _promising(judge, closer, side, hands, around, how)
         for hand, closed, verdict in _best_first(judge, closer, finalists, how):
-            least = best.score if best else 0.0
-            if verdict.score <= least:
+            least = best.verdict.firmness if best else 0.0
+            if verdict.firmness <= least:
                 break
             if palm and not _power(verdict, closing):
                 continue
             # digits that cross one another are separated last, because this is expensive
             there = closer.parted(hand.poses(covering.skeleton), hand.angles, closed)
             (verdict,) = _verdicts(judge, covering, hand, there)
-            if verdict.depth > _DEEPEST or verdict.score <= least or (palm and not _power(verdict, closing)):
+            if verdict.depth > _DEEPEST or verdict.firmness <= least or (palm and not _power(verdict, closing)):
                 continue
             if around and _runs_into(covering, hand, there.angles, around):
                 continue
@@ -193,7 +195,7 @@ def find_grasp(
                 touching,
                 tried,
             )
-        good = best and best.score >= _GOOD and len(best.touching) >= len(closing) - (len(closing) > 3)
+        good = best and best.verdict.firmness >= _GOOD and len(best.touching) >= len(closing) - (len(closing) > 3)
         if good or (best and 2 * tried >= count):
             break
     if best is None:
@@ -218,7 +220,7 @@ def _at_ease(
             break
         there = closer.parted_at(hand.poses(covering.skeleton), hand.angles, angles[None], tuple(chains))
         (verdict,) = _verdicts(judge, covering, hand, there)
-        holds = touching <= set(verdict.digits) and verdict.score >= _AS_WELL * best.score
+        holds = touching <= set(verdict.digits) and verdict.firmness >= _AS_WELL * best.verdict.firmness
         clear = verdict.depth <= _DEEPEST and not (around and _runs_into(covering, hand, there.angles, around))
         if holds and clear:
             return replace(best, angles=there.angles[0], verdict=verdict)
@@ -270,14 +272,17 @@ def _best_first(
         return []
     closed = closer.close(hands.poses(closer.covering.skeleton), hands.angles, apart=False, **how)
     verdicts = _verdicts(judge, closer.covering, hands, closed)
-    order = np.argsort([-verdict.score for verdict in verdicts], kind="stable")
+    order = np.argsort([-verdict.firmness for verdict in verdicts], kind="stable")
     rows = [int(g) for g in order if verdicts[g].depth <= _DEEPEST]
     return [(hands[g : g + 1], closed[g : g + 1], verdicts[g]) for g in rows]
 
 
 def _verdicts(judge: Judge, covering: Covering, hands: Candidates, closed: Closed) -> list[Verdict]:
-    poses = hands.poses(covering.skeleton, closed.angles)
-    return judge.judge(poses, covering.deform(poses, threads=1), closed.penetration)
+    poses, angles = hands.poses(covering.skeleton, closed.angles), closed.angles.copy()
+    for joints in digit_chains(covering.skeleton, closed.digits).values():
+        angles[:, list(joints), FLEXION] += _LITTLE
+    further = hands.poses(covering.skeleton, angles)
+    return judge.judge(poses, covering.deform(poses, threads=1), closed.penetration, further)
 
 
 def _promising(

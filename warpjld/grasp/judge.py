@@ -30,6 +30,7 @@ _NEARLY = 2.5e-3  # the same when ranking hands that closed roughly [m]
 _SPACING = 1.5e-3  # spacing of the sample points on the skin [m]
 _EDGES = 8  # edges of the friction cones
 _NOTHING = Contacts(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+_STILL = 1e-9  # way of a contact [m] below which closing does not move it
 _DIGIT = 0.01  # bonus to the score for every digit in contact [N]
 
 
@@ -43,6 +44,8 @@ class Verdict:
         digits: Digits that press, thumb included, e.g. ``thumb``.
         palm: Whether the palm presses.
         depth: Penetration depth of hand and object [m], see ``HandObjectGaps``.
+        tightening: Epsilon if each contact presses with only as much of its force as closing its digit presses it [N];
+            equal to ``epsilon`` where it is not known how digits close.
     """
 
     closed: bool
@@ -50,6 +53,7 @@ class Verdict:
     digits: tuple[str, ...]
     palm: bool
     depth: float
+    tightening: float = 0.0
 
     def __repr__(self) -> str:
         held = "force closed" if self.closed else "not force closed"
@@ -61,6 +65,11 @@ class Verdict:
         """Score [N]: epsilon + 0.01 N per pressing digit where the grasp is force closed, else 0."""
         return self.epsilon + _DIGIT * len(self.digits) if self.closed else 0.0
 
+    @property
+    def firmness(self) -> float:
+        """Score [N] of a grasp that is to be tightened: as ``score``, of contacts pressed by closing their digits."""
+        return self.tightening + _DIGIT * len(self.digits) if self.closed else 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Pressing:
@@ -71,12 +80,16 @@ class Pressing:
         digits: Digits that press, without side.
         palm: Whether the palm presses.
         depth: Depth of the skin's deepest point in the object [m].
+        straight: Cosine of the object's normal and the way of each contact as all joints of its digit flex alike, at
+            least 0, shape (C,): a contact that closing moves along the surface is not pressed by it. 1 for the palm,
+            and where it is not known how digits close.
     """
 
     contacts: Contacts
     digits: tuple[str, ...]
     palm: bool
     depth: float
+    straight: NDArray[np.float64]
 
 
 class Judge:
@@ -127,26 +140,35 @@ class Judge:
             ranks[g] = margin + 0.04 * len(hands[g].digits) + 0.1 * (margin > 0.0) - 50.0 * deep
         return ranks
 
-    def judge(self, poses: Poses, vertices: NDArray[np.floating], depths: NDArray[np.float64]) -> list[Verdict]:
+    def judge(
+        self,
+        poses: Poses,
+        vertices: NDArray[np.floating],
+        depths: NDArray[np.float64],
+        further: Poses | None = None,
+    ) -> list[Verdict]:
         """Judge G hands.
 
         Args:
             poses: The closed hands.
             vertices: Their deformed skins [m], shape (G, V, 3).
             depths: Penetration depths of hands and object [m], see ``HandObjectGaps``, shape (G,).
+            further: The hands with all joints that close flexed further, alike, by a little.
         """
-        hands = self.pressing(poses, vertices)
-        epsilons = least_resistances(
-            [hand.contacts for hand in hands], self._center, torque_scale=self._radius, edges=_EDGES
+        hands = self.pressing(poses, vertices, further)
+        contacts, shares = [hand.contacts for hand in hands], [hand.straight for hand in hands]
+        epsilons, tightenings = (
+            least_resistances(contacts, self._center, torque_scale=self._radius, edges=_EDGES, shares=share)
+            for share in (None, shares)
         )
         return [
-            Verdict(epsilon > 0.0, epsilon, hand.digits, hand.palm, max(float(depth), hand.depth))
-            for hand, epsilon, depth in zip(hands, epsilons, depths, strict=True)
+            Verdict(epsilon > 0.0, epsilon, hand.digits, hand.palm, max(float(depth), hand.depth), tightening)
+            for hand, epsilon, depth, tightening in zip(hands, epsilons, depths, tightenings, strict=True)
         ]
 
-    def pressing(self, poses: Poses, vertices: NDArray[np.floating]) -> list[Pressing]:
-        """Contacts that can press, of G closed hands with skins (G, V, 3) [m]."""
-        return self._pressing(poses, *self._patches(self._finer, vertices, _TOUCH))
+    def pressing(self, poses: Poses, vertices: NDArray[np.floating], further: Poses | None = None) -> list[Pressing]:
+        """Contacts that can press, of G closed hands with skins (G, V, 3) [m]; ``further`` as in ``judge``."""
+        return self._pressing(poses, *self._patches(self._finer, vertices, _TOUCH), further)
 
     def verdict(self, contacts: Contacts, digits: tuple[str, ...], palm: bool, depth: float) -> Verdict:
         """Judge contacts in the object's frame; they are force closed where epsilon is above 0."""
@@ -161,11 +183,17 @@ class Judge:
         local = place.to_local(vertices.reshape(-1, 3))[0].reshape(vertices.shape)
         return touching_patches(finer, parts, self.both.near, local, tolerance)
 
-    def _pressing(self, poses: Poses, patches: list[ContactPatches], depths: NDArray[np.float64]) -> list[Pressing]:
+    def _pressing(
+        self,
+        poses: Poses,
+        patches: list[ContactPatches],
+        depths: NDArray[np.float64],
+        further: Poses | None = None,
+    ) -> list[Pressing]:
         """What presses of the patches of every hand."""
         names = [name for own in patches for name in own.names]
         if not names:
-            return [Pressing(_NOTHING, (), False, float(depth)) for depth in depths]
+            return [Pressing(_NOTHING, (), False, float(depth), np.zeros(0)) for depth in depths]
         rows = np.array([SEGMENTS.index(name) for name in names])
         hand = np.repeat(np.arange(len(patches)), [len(own) for own in patches])
         points, normals, facing, areas = (
@@ -176,6 +204,7 @@ class Judge:
         turns = own * Rotation.from_quat(poses.rotations[hand, self._joints[rows]])
         kept = (turns.apply(self._inner[rows]) * facing).sum(axis=1) > 0.0
         contacts = Contacts(points, normals, np.array(self.friction), patch_spin(self.friction, areas))
+        straight = self._straight(poses, further, hand, rows, points, normals)
         digits = [name.partition(".")[0] for name in names]
         ends = np.searchsorted(hand, np.arange(len(patches) + 1))
         out = []
@@ -183,8 +212,32 @@ class Judge:
             its = first + np.flatnonzero(kept[first:end])
             pressing = [digits[k] for k in its]
             fingers = tuple(dict.fromkeys(name for name in pressing if name != "palm"))
-            out.append(Pressing(contacts[its], fingers, "palm" in pressing, depth))
+            out.append(Pressing(contacts[its], fingers, "palm" in pressing, depth, straight[its]))
         return out
+
+    def _straight(
+        self,
+        poses: Poses,
+        further: Poses | None,
+        hand: NDArray[np.integer],
+        rows: NDArray[np.integer],
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """``Pressing.straight`` of patches (n,) of hands, on segments ``rows``, in the object's frame; 1 for parts that
+        do not move, or without ``further``."""
+        if further is None:
+            return np.ones(len(rows))
+        place, joints = self.both.thing.place, self._joints[rows]
+        there = place.apply(points)[0]
+        turn = (
+            Rotation.from_quat(further.rotations[hand, joints])
+            * Rotation.from_quat(poses.rotations[hand, joints]).inv()
+        )
+        way = further.positions[hand, joints] + turn.apply(there - poses.positions[hand, joints]) - there
+        far = np.linalg.norm(way, axis=1)
+        along = (way * Rotation.from_quat(place.rotation[0]).apply(normals)).sum(axis=1)
+        return np.asarray(np.maximum(np.divide(along, far, out=np.ones(len(far)), where=far > _STILL), 0.0))
 
 
 def judge(

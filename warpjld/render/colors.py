@@ -23,6 +23,13 @@ _ROOT = 0.5
 which can be told from none; linearly it is as good as none."""
 
 
+def _bar(height: int) -> tuple[int, int, int]:
+    """Size of the numbers, width of the bar, and width of the strip at the border that both take, in pixels."""
+    size = max(10, round(height / 40))
+    width = max(8, round(0.7 * size))
+    return size, width, width + round(4.2 * size)
+
+
 def as_hex(color: str) -> str:
     """A colour as ``#rrggbb``, from a CSS name in any case, or ``#rgb``, ``#rrggbb``.
 
@@ -105,9 +112,8 @@ class ColorScale:
         from warpjld.render.text import write
 
         height, width = picture.shape[:2]
-        size = max(10, round(height / 40))
-        bar_width, bar_height = max(8, round(0.7 * size)), round(0.5 * height)
-        left, top = width - bar_width - round(4.2 * size), round(0.25 * height)
+        size, bar_width, strip = _bar(height)
+        bar_height, left, top = round(0.5 * height), width - strip, round(0.25 * height)
         canvas = Image.fromarray(picture.copy())
         ramp = self.table()[np.rint(np.linspace(255, 0, bar_height)).astype(int)]
         canvas.paste(Image.fromarray(np.repeat(ramp[:, None], bar_width, axis=1)), (left, top))
@@ -119,6 +125,12 @@ class ColorScale:
         if self.title:
             write(canvas, (width - 0.8 * size, top - 1.4 * size), self.title, size=size, color=ink, anchor="rm")
         return np.asarray(canvas)
+
+    @staticmethod
+    def room_beside(size: tuple[int, int]) -> tuple[int, int]:
+        """Width and height in the middle of a picture of this size that the bar does not cover."""
+        width, height = size
+        return max(width - 2 * (_bar(height)[2] + _bar(height)[0]), width // 2), height
 
     def ticks(self, apart: float = 0.0) -> NDArray[np.float64]:
         """Numbers to write beside the bar: four to eight round ones; with ``highest`` also ``high``. With a power, 1, 2

@@ -40,6 +40,7 @@ class FilmView:
 
     def __init__(self, scene: Scene, crowd: Crowd, asked: FilmOutput, stage: render.SceneRenderer) -> None:
         self._scene, self._crowd, self._asked, self._stage = scene, crowd, asked, stage
+        self._size = framed_size(scene, asked.style)
         self._views: dict[CameraSetting, render.Camera] = {}
 
     def at(self, place: int) -> CameraSetting | None:
@@ -59,15 +60,20 @@ class FilmView:
 
     def _view(self, camera: CameraSetting, frame: float) -> render.Camera:
         if camera.keys:
-            return self._crowd.camera(camera, self._scene.size, frame)
+            return self._crowd.camera(camera, self._size, frame)
         if camera not in self._views:
-            self._views[camera] = self._crowd.camera(camera, self._scene.size)
+            self._views[camera] = self._crowd.camera(camera, self._size)
         return self._views[camera]
 
 
 def lamps_at(scene: Scene, frame: float) -> list[render.Lamp]:
     """The lamps of a scene at a frame."""
     return [lamp.at(frame) for lamp in scene.lamps.values()]
+
+
+def framed_size(scene: Scene, style: PictureStyle) -> tuple[int, int]:
+    """Size that a named view is framed for: the picture's, without what a colour scale covers."""
+    return render.ColorScale.room_beside(scene.size) if style == "pressure" else scene.size
 
 
 def style_of(scene: Scene) -> render.Style:
@@ -119,7 +125,7 @@ class PressureStudio:
 @contextmanager
 def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Iterator[FilmStudio | PressureStudio]:
     """Context that renders a ``FILM``."""
-    camera = crowd.camera(film.camera, scene.size)
+    camera = crowd.camera(film.camera, framed_size(scene, film.style))
     quality = render.Quality.film()
     with render.Film(path, rate=scene.rate) as writer:
         if film.style == "pressure":
@@ -144,10 +150,11 @@ def film_studio(scene: Scene, crowd: Crowd, film: FilmOutput, path: Path) -> Ite
 
 
 def draw_picture(scene: Scene, crowd: Crowd, picture: Picture, path: Path) -> None:
-    """Draw a ``PICTURE``; a named view is framed for the whole sequence, so that pictures of a scene match."""
+    """Draw a ``PICTURE``; a named view is framed for the whole sequence, so that pictures of a scene match, those of
+    pressure beside their colour scale."""
     now = crowd.at(picture.frame, scene.rate)
     shift = now.shift(picture.camera, 0)
-    camera = crowd.camera(picture.camera, scene.size, picture.frame)
+    camera = crowd.camera(picture.camera, framed_size(scene, picture.style), picture.frame)
     if picture.style == "pressure":
         solved = [] if crowd.pressed is None else [frame.frame for frame in crowd.pressed.frames]
         if crowd.pressed is not None and picture.frame > max(solved, default=crowd.pressed.model.start):

@@ -106,10 +106,20 @@ def least_resistance(contacts: Contacts, center: ArrayLike, *, torque_scale: flo
 
 
 def least_resistances(
-    grasps: Sequence[Contacts], center: ArrayLike, *, torque_scale: float, edges: int = 8
+    grasps: Sequence[Contacts],
+    center: ArrayLike,
+    *,
+    torque_scale: float,
+    edges: int = 8,
+    shares: Sequence[Array] | None = None,
 ) -> list[float]:
-    """``least_resistance`` of many grasps of one object [N]."""
+    """``least_resistance`` of many grasps of one object [N]; ``shares`` are the normal forces of each grasp's contacts
+    (C,) at which each takes 1 N of the sum [N], by default 1 N."""
     blocks = [contact_wrenches(contacts, center, torque_scale, edges) for contacts in grasps]
+    if shares is not None:
+        blocks = [
+            [size * block for size, block in zip(*both, strict=True)] for both in zip(shares, blocks, strict=True)
+        ]
     spanning = [k for k, own in enumerate(blocks) if own and has_full_rank(np.concatenate(own, axis=1))]
     points = [_union(blocks[k]) for k in spanning]
     out = [0.0] * len(grasps)
