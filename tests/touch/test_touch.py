@@ -146,12 +146,13 @@ def test_surfaces_of_so_few_vertices_that_all_are_tested_at_once_are_parted() ->
     a, b, c = (few[faces[:, k]] for k in range(3))
     inward = (np.cross(b - a, c - a) * (a - few.mean(axis=0))).sum(axis=1) < 0.0
     faces[inward] = faces[inward][:, ::-1]
-    left, right = few - [few[:, 0].max(), 0.0, 0.0], few * [-1.0, 1.0, 1.0] + [few[:, 0].max(), 0.0, 0.0]
+    along = np.array([1.0, 0.0, 0.0])
+    left, right = few - few[:, 0].max() * along, few * [-1.0, 1.0, 1.0] + few[:, 0].max() * along
     both = np.concatenate([faces, faces[:, ::-1] + count])
-    apart = np.concatenate([left - [RADIUS, 0.0, 0.0], right + [RADIUS, 0.0, 0.0]])
+    apart = np.concatenate([left - RADIUS * along, right + RADIUS * along])
     own = np.repeat([0, 1], count).astype(np.int32)
     touch = Touch(patches(both, own, ("left", "right"), np.full(2 * count, RADIUS), None), apart)
-    overlapping = np.concatenate([left + [RADIUS / 8.0, 0.0, 0.0], right - [RADIUS / 8.0, 0.0, 0.0]])
+    overlapping = np.concatenate([left + RADIUS / 8.0 * along, right - RADIUS / 8.0 * along])
     parted = np.asarray(touch.apply(overlapping[None])[0][0])
     assert np.isfinite(parted).all()
     assert parted[:count, 0].max() < overlapping[:count, 0].max() - 1e-4
