@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.benchmarks.skin.altered import ALTERATIONS
 from tests.benchmarks.skin.calibration import worse
 from tests.benchmarks.skin.measures import Measuring, dihedral_angles, fold_kinds, roughness
 from tests.benchmarks.skin.poses import POSES, pose
 from tests.benchmarks.skin.rigs import RIGS, BenchRig, load
 from warpjld.covering import Covering
 from warpjld.covering.intersections import Parts, surface_parts
+from warpjld.covering.quality import enclosed_volume
 from warpjld.rig import Rig
 from warpjld.skeleton import CHANNELS, poses_from_angles, rest_poses
 
@@ -116,3 +118,23 @@ def test_calibration_makes_no_pose_worse(name: str, measuring: Measuring) -> Non
         before, after = (measuring.measure(c.deform(posed.poses)[0], posed) for c in (bench.covering, calibrated))
         complaints += [f"{pose_name}: {text}" for text in worse(before, after)]
     assert not complaints
+
+
+def test_altered_rigs_are_what_their_names_say(measuring: Measuring) -> None:
+    """Of a hand without painted weights: thickness, number of triangles, length, and where the joints are."""
+    bench = measuring.bench
+    made = {name: ALTERATIONS[name](bench) for name in ALTERATIONS if not name.startswith("digitised")}
+    assert made["as it is"] is bench.rig
+    rest, faces = bench.rig.surface, len(bench.rig.surface.faces)
+    volume = enclosed_volume(rest.vertices, rest.faces)
+    for name, low, high in (("flesh 1.3 times as thick", 1.4, 1.75), ("flesh 0.75 times as thick", 0.5, 0.75)):
+        surface = made[name].surface
+        assert low < enclosed_volume(surface.vertices, surface.faces) / volume < high
+    assert len(made["subdivided once"].surface.faces) == 4 * faces
+    assert len(made["half of the triangles"].surface.faces) == pytest.approx(0.5 * faces, rel=0.02)
+    longest = np.ptp(made["1.4 times as long"].surface.vertices, axis=0).max()
+    assert longest == pytest.approx(1.4 * np.ptp(rest.vertices, axis=0).max())
+    moved = np.linalg.norm(made["joints off centre by 20 %"].skeleton.rest - bench.rig.skeleton.rest, axis=1)
+    twice = np.linalg.norm(made["joints off centre by 40 %"].skeleton.rest - bench.rig.skeleton.rest, axis=1)
+    np.testing.assert_allclose(twice, 2.0 * moved)
+    assert moved.max() > 1e-3

@@ -139,6 +139,25 @@ def test_a_frame_does_not_follow_from_those_before() -> None:
         assert of_it == [one for one in told if one.frame == k]
 
 
+def test_surfaces_of_so_few_vertices_that_all_are_tested_at_once_are_parted() -> None:
+    count = 12
+    few = ConvexHull(BALL[:: COUNT // count][:count]).points
+    faces = ConvexHull(few).simplices.astype(np.int32)
+    a, b, c = (few[faces[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * (a - few.mean(axis=0))).sum(axis=1) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    along = np.array([1.0, 0.0, 0.0])
+    left, right = few - few[:, 0].max() * along, few * [-1.0, 1.0, 1.0] + few[:, 0].max() * along
+    both = np.concatenate([faces, faces[:, ::-1] + count])
+    apart = np.concatenate([left - RADIUS * along, right + RADIUS * along])
+    own = np.repeat([0, 1], count).astype(np.int32)
+    touch = Touch(patches(both, own, ("left", "right"), np.full(2 * count, RADIUS), None), apart)
+    overlapping = np.concatenate([left + RADIUS / 8.0 * along, right - RADIUS / 8.0 * along])
+    parted = np.asarray(touch.apply(overlapping[None])[0][0])
+    assert np.isfinite(parted).all()
+    assert parted[:count, 0].max() < overlapping[:count, 0].max() - 1e-4
+
+
 def test_refuses_points_of_another_surface_and_negative_compliances() -> None:
     with pytest.raises(InputError, match="want points of shape"):
         TOUCH.apply(np.zeros((1, 5, 3)))

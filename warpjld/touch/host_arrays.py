@@ -10,6 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["floats", "numbers", "recorded", "starts", "vectors"]
 
 
+class _Nothing:
+    """A recorded launch that does nothing."""
+
+    def launch(self) -> None:
+        """Do nothing."""
+
+
+_NOTHING = _Nothing()
+
+
 def vectors(values: NDArray[np.floating]) -> Any:
     """A Warp array of vec3 (n,) that owns a copy of values (n, 3)."""
     import warp as wp
@@ -18,10 +28,11 @@ def vectors(values: NDArray[np.floating]) -> Any:
 
 
 def recorded(kernel: Any, dim: int | tuple[int, int], inputs: list[Any], outputs: list[Any]) -> Any:
-    """A kernel launch with fixed arguments, recorded once to be repeated every frame."""
+    """A kernel launch with fixed arguments, recorded once to be repeated every frame; of no rows, it does nothing."""
     import warp as wp
 
-    return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True)
+    # Warp records nothing of a launch without rows
+    return wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device="cpu", record_cmd=True) or _NOTHING
 
 
 def numbers(values: NDArray) -> Any:
