@@ -199,7 +199,8 @@ class _Run:
             )
         if not solution.converged:
             ahead = [self._bone_inside(driven, [step]) for step in steps if step > solution.last.time]
-            reason = next(filter(None, ahead), f"at frame {frame:g}: {solution.message}")
+            why = "; ".join(filter(None, [solution.message, self.clearance.crushing(driven, steps[-1])]))
+            reason = next(filter(None, ahead), f"at frame {frame:g}: {why}")
             return self.ended(solution.status, reason)
         self._note_bones(driven, frame)
         self._edit(self.limits.edits(model, since, time))
@@ -268,8 +269,9 @@ class _Run:
         return next(filter(None, found), None)
 
     def _note_bones(self, model: ContactModel, frame: float) -> None:
-        """Record the smallest clearance between bones and objects."""
-        for one in self.clearance.nearest(model, frame - model.start):
+        """Record the smallest clearance of bones from objects and from one another."""
+        time = frame - model.start
+        for one in (*self.clearance.nearest(model, time), *self.clearance.between_digits(model, time)):
             place = (one.actor, one.digit, one.object)
             if one.left < TIGHT and (place not in self.tight or one.left < self.tight[place][1].left):
                 self.tight[place] = (frame, one)
