@@ -22,6 +22,7 @@ from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightB
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
 from warpjld.simulation.solve.corrected_digit import CorrectedDigit
+from warpjld.simulation.solve.digit_loads import crushed
 from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits
 from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
@@ -199,7 +200,8 @@ class _Run:
             )
         if not solution.converged:
             ahead = [self._bone_inside(driven, [step]) for step in steps if step > solution.last.time]
-            why = "; ".join(filter(None, [solution.message, self.clearance.crushing(driven, steps[-1])]))
+            parts = solution.message, self.clearance.crushing(driven, steps[-1]), crushed(solution.pressed)
+            why = "; ".join(filter(None, parts))
             reason = next(filter(None, ahead), f"at frame {frame:g}: {why}")
             return self.ended(solution.status, reason)
         self._note_bones(driven, frame)

@@ -24,6 +24,8 @@ __all__ = ["TIGHT", "BoneClearance", "TightBone", "nearest_digits"]
 
 TIGHT = 0.4
 """Relative thickness of the flesh over a bone below which pressures of about 1 MPa are to be expected."""
+_SQUEEZED = 0.5
+"""The same between the bones of two digits below which that is given as the reason if no equilibrium is found."""
 _BONE = "the bone of "
 """Beginning of the name of a digit's bone where it is what is near."""
 _LEAST = 5e-4
@@ -85,7 +87,7 @@ class BoneClearance:
         That is no reason to refuse a pose, as flesh may bulge aside, but the reason where no equilibrium is found.
         """
         worst = min(self.between_digits(model, time), key=lambda bone: bone.left, default=None)
-        return "" if worst is None or worst.left >= TIGHT else worst.text
+        return "" if worst is None or worst.left >= _SQUEEZED else worst.text
 
     def between_digits(self, model: ContactModel, time: float) -> list[TightBone]:
         """Least relative thickness of the flesh between the bones of two digits at a time, where it is below 1."""
