@@ -24,6 +24,7 @@ from warpjld.simulation.solve.bone_clearance import TIGHT, BoneClearance, TightB
 from warpjld.simulation.solve.branch import solve_onward
 from warpjld.simulation.solve.checkpoint import Checkpoint, CheckpointFile
 from warpjld.simulation.solve.corrected_digit import CorrectedDigit
+from warpjld.simulation.solve.digit_loads import crushed
 from warpjld.simulation.solve.fallen import falling_model, rest_frames
 from warpjld.simulation.solve.falling import Falls
 from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits
@@ -123,8 +124,9 @@ class FramesRun:
             )
         if not solution.converged:
             ahead = [self._bone_inside(driven, [step]) for step in steps if step > solution.last.time]
-            hint = soft_crease(self.contact)
-            reason = next(filter(None, ahead), f"at frame {frame:g}: {solution.message}{hint}")
+            parts = solution.message, self.clearance.crushing(driven, steps[-1]), crushed(solution.pressed)
+            why = "; ".join(filter(None, parts)) + soft_crease(self.contact)
+            reason = next(filter(None, ahead), f"at frame {frame:g}: {why}")
             return self.ended(solution.status, reason)
         self._note_bones(driven, frame)
         self._edit(self.limits.edits(model, since, time))
@@ -199,8 +201,9 @@ class FramesRun:
         return next(filter(None, found), None)
 
     def _note_bones(self, model: ContactModel, frame: float) -> None:
-        """Record the smallest clearance between bones and objects."""
-        for one in self.clearance.nearest(model, frame - model.start):
+        """Record the smallest clearance of bones from objects and from one another."""
+        time = frame - model.start
+        for one in (*self.clearance.nearest(model, time), *self.clearance.between_digits(model, time)):
             place = (one.actor, one.digit, one.object)
             if one.left < TIGHT and (place not in self.tight or one.left < self.tight[place][1].left):
                 self.tight[place] = (frame, one)

@@ -138,8 +138,8 @@ def test_rigid_ball(closing: FleshMotion) -> None:
             np.testing.assert_allclose(shared.load, digit.load, rtol=0.0, atol=1e-3 * digit.force + passed + noise)
     read = tactile_of(hand, found.instants)
     assert not read.touching[:2].any()
-    for digit in ("pinky", "ring", "middle", "index", "thumb"):
-        assert read.touching[-1, read.pads.index(f"left.{digit}.distal")]
+    for name in ("pinky", "ring", "middle", "index", "thumb"):
+        assert read.touching[-1, read.pads.index(f"left.{name}.distal")]
     assert (np.diff(read.normal_force[2:].sum(axis=1)) > 0.0).all()
     assert read.normal_force[-1].sum() == pytest.approx(found.last.touches[0].normal_force, rel=1e-9)
 

@@ -16,7 +16,7 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.grasp_balance import allowed_net
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 
-__all__ = ["CRUSHING", "DigitLoad", "digit_loads", "peaks_of"]
+__all__ = ["CRUSHING", "DigitLoad", "crushed", "digit_loads", "peaks_of"]
 
 CRUSHING = 1e6
 """Pressure on skin above which its flesh counts as crushed [Pa]: laws of flesh were never measured there."""
@@ -109,6 +109,16 @@ def _pushes(
             if digit and mine[digit_of == digit].sum(axis=0) @ net > 0.0 and share > out.get(digit, ("", 0.0))[1]:
                 out[digit] = (name, share)
     return out
+
+
+def crushed(pressure: float) -> str:
+    """Message about the highest pressure before no equilibrium was found [Pa]; empty if flesh bears it.
+
+    Far beyond that, flesh between prescribed sides bulges and folds in many ways, and no solver follows it.
+    """
+    if pressure <= CRUSHING:
+        return ""
+    return f"before, {1e-6 * pressure:.2g} MPa were reached, which crush flesh: let the parts that press move less far"
 
 
 def peaks_of(model: ContactModel, hand: FleshBody, solved: SolvedFrame) -> dict[str, float]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpjld.fem.arrays import Array, Ints
+from warpjld.fem.arrays import Array, Ints, Ints32
 from warpjld.geometry.rotations import unit
 
 __all__ = ["FacingParts"]
@@ -39,7 +39,7 @@ class FacingParts:
     area: Array
 
     @classmethod
-    def of(cls, where: Ints, count: int, share: Array, slave: Array, master: Array) -> FacingParts:
+    def of(cls, where: Ints | Ints32, count: int, share: Array, slave: Array, master: Array) -> FacingParts:
         """Sums over facet pairs.
 
         Args:

@@ -166,6 +166,7 @@ class ContactSolution:
             known.
         last_step: Start of the step that found the last instant; None if not known.
         spent: Linear solves of the run, those in vain included.
+        pressed: Highest pressure at the last equilibrium, also between the times asked for [Pa].
     """
 
     status: SolveStatus
@@ -177,6 +178,7 @@ class ContactSolution:
     correction_rate: Array | None = None
     last_step: LastStep | None = None
     spent: int = 0
+    pressed: float = 0.0
 
     @property
     def converged(self) -> bool:

@@ -40,7 +40,7 @@ Iterations:
    set strategy: Hüeber & Wohlmuth 2005). λ_n of the previous solve bounds friction in (3), so that each solve is a
    convex problem (Tresca friction). Friction acts on a point from its second iteration with pressure on; if it has slid
    far without friction until then, and no body is held by friction alone, it begins by sliding, else by sticking. If
-   contact alone holds a body that slid everywhere, all its points begin by sticking (``stuck_again``).
+   contact alone holds a body that slid everywhere and is let go, all points begin by sticking (``stuck_again``).
 5. *Alternating phase*, afterwards: λ is updated only if the active set did not change; otherwise a line search along Δu
    (by work, or by the residual if E is present) settles the active set.
    In either phase friction is bounded by the current pressure (``coupled``: full Coulomb friction) once the same points

@@ -13,7 +13,7 @@ from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.fem.contact.law.multipliers import elastic_multipliers, update_multipliers
 from warpjld.fem.contact.law.return_mapping import ContactTractions, return_mapping
-from warpjld.fem.contact.solver.first_states import stuck_again
+from warpjld.fem.contact.solver.first_states import farthest_carried, stuck_again
 from warpjld.fem.contact.solver.tangent import friction_coupling, linearise_mortar
 from warpjld.fem.load.inertia import Inertia
 from warpjld.fem.load.loads import Loads
@@ -34,6 +34,8 @@ GRAZING = 0.02
 """Overlap of two prescribed sides, in element edges, that counts as touching; more is reported as blocked."""
 IMMOBILE = 1e-9
 """Mobility (see ``mobility``) below which a point counts as prescribed along its normal."""
+_STILL = 1e-9
+"""Change of a prescribed displacement in a step, over the bodies' size, that is none."""
 _SETTLED = 2e-3
 """Convergence tolerance of the multipliers: change relative to the contact forces, (6) of ``contact.solver``."""
 _SLIGHT = 0.01
@@ -268,10 +270,14 @@ class ContactSystem:
         """States with ``open_before`` set for the start of a step, on interfaces with friction.
 
         With inertia no site slides freely before contact begins: friction acts on the velocity at the end of the step.
-        Where contact alone holds a body, ``stuck_again`` gives the states.
+        Where contact alone holds a body and nothing prescribed moves, ``stuck_again`` gives the states.
         """
-        states = states if step.held else stuck_again(self.interfaces, states)
-        x = self._rest + start.reshape(-1, 3)
+        x, known = self._rest + start.reshape(-1, 3), step.prescribed
+        if not step.held:
+            moved = float(np.abs(known.values - start[known.degrees]).max(initial=0.0))
+            moved = max(moved, farthest_carried(self.interfaces, x, step.before, step.time))
+            still = moved <= _STILL * float(np.ptp(self._rest, axis=0).max())
+            states = stuck_again(self.interfaces, states) if still else states
         out = []
         for interface, s in zip(self.interfaces, states, strict=True):
             if interface.pair.friction > 0.0:

@@ -13,7 +13,7 @@ from warpjld.fem.arrays import Array
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 
-__all__ = ["first_state", "stuck_again"]
+__all__ = ["farthest_carried", "first_state", "stuck_again"]
 
 
 def first_state(interface: Interface, nodes: Array) -> ContactState:
@@ -38,11 +38,18 @@ def first_state(interface: Interface, nodes: Array) -> ContactState:
     return state
 
 
+def farthest_carried(interfaces: Sequence[Interface], x: Array, before: float, time: float) -> float:
+    """Largest motion between two times of obstacles near positions x (N, 3) [m]."""
+    found = (interface.points(x, before, time).carried for interface in interfaces if interface.mortar is None)
+    return max((float(np.abs(carried).max(initial=0.0)) for carried in found), default=0.0)
+
+
 def stuck_again(interfaces: Sequence[Interface], states: list[ContactState]) -> list[ContactState]:
     """States in which all points with pressure and friction stick, if all of them slid: an elastic predictor.
 
-    Where contact alone holds a body, nothing else would resist its first motion: a block that slid between two pads and
-    then is let go went half a millimetre in the first linear solve, 24 more were in vain; with this there are three.
+    For bodies that contact alone holds and that are let go, as nothing else would resist their first motion: a block
+    that slid between two pads went half a millimetre in the first linear solve, and 24 more were in vain; with this
+    there are three. Not where prescribed sides move on, as these drag the body along.
     """
     known = zip(interfaces, states, strict=True)
     rubs = [(s.pressure > 0.0) & (interface.pair.friction > 0.0) for interface, s in known]

@@ -73,6 +73,7 @@ class LoadSteps:
         u: Displacement of the last equilibrium [m], shape (3N,).
         states: Contact state of each interface there.
         steps: Number of linear solves of each load step taken.
+        pressed: Highest pressure there [Pa].
         velocity: Velocity there [m/s], shape (3N,); None without inertia.
     """
 
@@ -117,6 +118,7 @@ class LoadSteps:
             self.u = after.last.displacement.reshape(-1).copy()
             self.states = list(after.states)
         self.steps: list[int] = []
+        self.pressed = 0.0
         self._dynamics = None if dynamics is None else dynamics.checked(body)
         self._masses = None if dynamics is None else lumped_masses(body)
         self.velocity: Array | None = None if dynamics is None else np.asarray(dynamics.velocity, float).reshape(-1)
@@ -255,6 +257,7 @@ class LoadSteps:
         if step.inertia is not None:
             self.velocity = step.inertia.velocity_at(found.displacement)
         self.u, self.states = found.displacement, found.states
+        self.pressed = max((float(t.pressure.max(initial=0.0)) for t in found.tractions), default=0.0)
         if target in self.times:
             for interface, reach in zip(self.interfaces, self._reaches, strict=True):
                 interface.reach = reach  # initial overlaps are removed at the first time
@@ -341,8 +344,5 @@ class LoadSteps:
         if not reached:
             zero = np.zeros((len(self.body.mesh.nodes), 3))
             reached = [ContactInstant(self.start, self.u.reshape(-1, 3), zero, (), 0, 0, 0.0)]
-        states, steps = tuple(self.states), tuple(self.steps)
-        rate, last = self.correction_rate, self.last_step
-        return ContactSolution(
-            status, tuple(reached), message, states, steps, step.loads, rate, last, self.budget.spent
-        )
+        states, more = tuple(self.states), (self.correction_rate, self.last_step, self.budget.spent, self.pressed)
+        return ContactSolution(status, tuple(reached), message, states, tuple(self.steps), step.loads, *more)
