@@ -44,7 +44,7 @@ class TrialOutcome(Enum):
     APART = "pressed on nothing"
     WEAK = "pressed too little for friction to bear the weight"
     SLIDES = "slid at every point"
-    GIVES = "slipped out: less was borne the deeper it sank"
+    GIVES = "slipped, turned or rolled on without coming to rest"
     SANK = "sank away"
     STANDS = "left it standing on something else"
     UNSOLVED = "could not be solved"
