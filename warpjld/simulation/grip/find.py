@@ -26,7 +26,7 @@ __all__ = ["find_grip"]
 
 _START = math.radians(0.5)
 """First step of a search [rad]."""
-_NEAR = 0.03
+_NEAR = 0.05
 """Tolerance of the smallest grip, relative to its force."""
 
 _TRIALS = 10
