@@ -27,8 +27,8 @@ __all__ = ["find_grip"]
 _START = math.radians(0.5)
 """First step of a search [rad]."""
 _NEAR = 0.1
-"""Tolerance of the smallest grip, relative to its force: a trial near the limit, where the object creeps, takes 50 to 100
-linear solves."""
+"""Tolerance of the smallest grip, relative to its force: a trial near the limit, where the object creeps, takes 50 to
+100 linear solves."""
 
 _TRIALS = 10
 """Most grips tried; as a rule three or four are enough."""
