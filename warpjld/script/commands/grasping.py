@@ -73,8 +73,8 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
         "[THUMB/INDEX/MIDDLE/RING/PINKY …] [TRIES <placements>] [POSTURE <SPHERE/CYLINDER/PINCH/PLATE>], or "
         "GRASP <key1> <key2> BOTH <object> AUTO [TRIES <placements>]"
     ),
-    help="Close digits on an object between key1 and key2; COUPLING flexes joints together; AUTO also places the hand, BOTH "
-    "two.",
+    help="Close digits on an object between key1 and key2; COUPLING flexes joints together; AUTO also places the "
+    "hand, BOTH two.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:
