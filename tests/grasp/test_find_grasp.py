@@ -196,11 +196,26 @@ def test_what_is_walled_in_is_told(covering) -> None:
         ({"side": "right"}, "want one of left"),
         ({"posture": "fist"}, "no posture 'fist'"),
         ({"friction": 0.0}, "friction: want a number above 0"),
+        ({"digits": ("index", "pinky")}, "want thumb and one or more of index, middle, ring"),
     ],
 )
 def test_wrong_wishes(covering, options: dict, says: str) -> None:
     with pytest.raises(InputError, match=says):
         find_grasp(covering, ball(), **options)
+
+
+@pytest.mark.slow
+def test_two_digits_that_are_named_oppose_each_other(covering) -> None:
+    edge = 0.04
+    thing = box(edge, edge, edge)
+    found = find_grasp(covering, thing, digits=("thumb", "index"), count=64)
+    assert found.touching == ("left.thumb", "left.index")
+    both = HandObjectGaps(covering, thing)
+    poses = found.poses(covering.skeleton)
+    (pressing,) = Judge(both, "left", 0.6).pressing(poses, covering.deform(poses))
+    normals = pressing.contacts.normals
+    assert (normals @ normals.T).min() < -0.8  # on opposite sides
+    assert np.linalg.norm(pressing.contacts.points.mean(axis=0) - thing.centroid) < 0.5 * edge
 
 
 def test_what_no_hand_can_span_is_told_with_both_widths(covering) -> None:

@@ -213,6 +213,8 @@ def test_grasp_auto(run) -> None:
     assert np.linalg.norm(away - there) == pytest.approx(0.12, abs=1e-6)
     with pytest.raises(InputError, match="did you mean PLATE"):
         run("GRASP 35 45 LEFT apple AUTO POSTURE PLATES")
+    with pytest.raises(InputError, match="want thumb and one or more of index, middle, ring"):
+        run("GRASP 35 45 LEFT apple AUTO THUMB PINKY")
 
 
 def test_two_hands_take_a_crate(run, scene, hands) -> None:

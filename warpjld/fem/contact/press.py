@@ -89,6 +89,8 @@ def press(
     for name, most in (("halvings", halvings), ("solves", solves)):
         if most is not None and most < 0:
             raise InputError(f"{name}: want 0 or more, got {most}")
+    if isinstance(loads, Loads) and loads.drag is not None and np.shape(loads.drag) != (len(body.mesh.nodes),):
+        raise InputError(f"loads: drag wants {len(body.mesh.nodes)} values, got shape {np.shape(loads.drag)}")
     if method == "paper" and dynamics is not None:
         raise InputError("dynamics: the paper's loop knows no inertia; want the method augmented")
     if method == "paper":

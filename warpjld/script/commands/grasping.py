@@ -74,7 +74,7 @@ def auto_f_2_3(scene: Scene, arguments: Arguments) -> None:
         "GRASP <key1> <key2> BOTH <object> AUTO [TRIES <placements>]"
     ),
     help="Close digits on an object between key1 and key2; COUPLING flexes joints together; AUTO also places the "
-    "hand, for the digits named to oppose each other, BOTH two.",
+    "hand, BOTH two.",
     group="Grasping",
 )
 def grasp(scene: Scene, arguments: Arguments) -> None:

@@ -44,7 +44,7 @@ class TrialOutcome(Enum):
     APART = "pressed on nothing"
     WEAK = "pressed too little for friction to bear the weight"
     SLIDES = "slid at every point"
-    GIVES = "slipped out: less was borne the deeper it sank"
+    GIVES = "slipped, turned or rolled on without coming to rest"
     SANK = "sank away"
     STANDS = "left it standing on something else"
     UNSOLVED = "could not be solved"
@@ -87,6 +87,7 @@ class Trial:
         slope: Derivative of the capacity with respect to the grip; None if not known.
         loaded: Whether the pressures are those under the weight.
         pressed: Sum of the normal forces on the object before the weight acted [N]; NaN if not known.
+        telling: Whether ``borne`` tells how much more capacity is needed: not if the trial ended as the object slipped.
     """
 
     outcome: TrialOutcome
@@ -100,6 +101,7 @@ class Trial:
     slope: float | None = None
     loaded: bool = True
     pressed: float = float("nan")
+    telling: bool = True
 
     @property
     def able(self) -> float:
@@ -238,16 +240,17 @@ class _Search:
     def _note(self, grip: float, trial: Trial) -> None:
         if trial.loaded and not any(one.loaded for _, one in self.trials[:-1]):
             self._bracket.distrust()  # earlier capacities are those before the weight acted
-        if not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # a capacity of 1 is not enough
+        if trial.telling and not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # a capacity of 1 is not enough
             self._needed = self._aim * trial.able / trial.borne
         self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
         self._bracket.target = max(self._needed, self._firmer(trial))
 
     def _firmer(self, trial: Trial) -> float:
-        """Least capacity to try next after an object turned or rolled out of a grip; 0 after other outcomes."""
-        rolls = any(one.outcome in (TrialOutcome.GIVES, TrialOutcome.SANK) for _, one in self.trials)
+        """Least capacity to try next after an object slipped, turned or rolled out of a grip; 0 otherwise."""
+        slipped = (TrialOutcome.SLIDES, TrialOutcome.GIVES, TrialOutcome.SANK)
+        fails = any(one.outcome in slipped and not one.telling for _, one in self.trials)
         below, above = self._bracket.below, self._bracket.above
-        if not rolls or below is None or not below.value > 0.0:
+        if not fails or below is None or not below.value > 0.0:
             return 0.0
         return _FIRMER * below.value if above is None else float(np.sqrt(below.value * above.value))
 

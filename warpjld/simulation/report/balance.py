@@ -26,10 +26,11 @@ class ObjectBalance:
     Attributes:
         object: Name of the object.
         frame: Frame number.
-        force: Resultant [N], shape (3,).
+        force: Resultant [N], shape (3,); with its weight if the object is lifted.
         moment: Resultant moment about the force-weighted centre [N m], shape (3,).
         pressing: Sum of the magnitudes of the nodal forces [N].
-        by_hands: Whether only hands touch it, and no HOLD or support constrains it.
+        by_hands: Whether only hands touch it, and no HOLD or support constrains it. Not so for one that was lifted: the
+            gentlest grip may slide at every point, and be in balance all the same.
         weight: Assumed weight of a rigid object [N]; 0 for a deformable one.
         borne: Whether something else balances a resultant: its animation, HOLD, a support, or gravity.
     """
@@ -93,8 +94,12 @@ def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
         centre = size @ x / pressing
         moment = np.cross(x - centre, forces).sum(axis=0)
         one = bodies.get(name)
-        kept = one is not None and (bool(one.states) or one.support is not None)
+        support = None if one is None else one.support
+        lifted = support is not None and solved.frame - model.start >= support.free - 1e-9
+        kept = one is not None and (bool(one.states) or support is not None)
         borne = one is None or kept or any(model.loads.gravity)
+        if lifted:  # its weight is what the hand bears
+            force = force + model.pull(name).sum(axis=0)
         weight = weight_of(model.obstacles[name], solved.frame - model.start) if one is None else 0.0
         out.append(
             ObjectBalance(name, solved.frame, force, moment, pressing, others <= hands and not kept, weight, borne)
