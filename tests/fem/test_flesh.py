@@ -52,6 +52,18 @@ def test_example(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("spacing", [0.006, 0.004, 0.003])
+def test_a_hand_whose_wrist_ends_in_a_thin_lip_is_meshed(data: Path, spacing: float) -> None:
+    """Its rim stays off the mesh by up to 2.3 elements; it was refused as a digit that is too thin would be."""
+    rig = load_rig(data / "hand_godot_low" / "Hand_low_L.gltf")
+    flesh = flesh_of(rig, spacing, gap=0.2, head=0.03)
+    assert len(flesh.bones) >= 20
+    tips = [rig.skeleton.index(f"left.{digit}.tip") for digit in ("thumb", "index", "middle", "ring", "pinky")]
+    near = np.linalg.norm(rig.surface.vertices[:, None] - rig.skeleton.rest[tips], axis=2).min(axis=1) < 0.01
+    assert flesh.skin.outside[near].max() < 1.0
+
+
+@pytest.mark.slow
 def test_spacing_too_coarse_for_the_fingers() -> None:
     from warpjld.hand import build_hand
 

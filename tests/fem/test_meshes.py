@@ -171,6 +171,20 @@ def test_embedded_points_follow_a_linear_field_exactly() -> None:
         embed(mesh, np.array([[5.0, 0.0, 0.0]]))
 
 
+def test_points_beside_squashed_elements_are_as_far_outside_as_their_distance() -> None:
+    """Elements of edge 1, but for a last layer of a fiftieth: half an edge beyond it is no 25 sizes outside."""
+    from warpjld.fem.mesh.hexmesh import elements_of
+
+    x = np.array([0.0, 1.0, 2.0, 3.0, 3.02])
+    nodes = np.stack(np.meshgrid(x, x[:4], x[:4], indexing="ij"), axis=-1).reshape(-1, 3)
+    elements = elements_of(np.arange(len(nodes), dtype=np.int32).reshape(5, 4, 4)).reshape(-1, 8)
+    mesh = HexMesh(nodes, elements, np.zeros(len(elements), np.int32))
+    beside = np.array([[3.52, 1.5, 1.5]])
+    np.testing.assert_allclose(embed(mesh, beside).outside, [0.5], atol=0.05)
+    with pytest.raises(InputError, match="lies 2 element sizes outside the mesh, more than 1"):
+        embed(mesh, beside + np.array([1.5, 0.0, 0.0]))
+
+
 @pytest.mark.parametrize(("suffix", "form"), [(".vtu", "vtu"), (".inp", "abaqus"), (".msh", "gmsh"), (".msh", "ansys")])
 def test_exchange(tmp_path: Path, suffix: str, form: str) -> None:
     meshio = pytest.importorskip("meshio")

@@ -17,10 +17,16 @@ from warpjld.fem.mesh.embedding import Embedding, embed
 from warpjld.fem.mesh.envelope import Envelope
 from warpjld.fem.mesh.fit import Fit, fit_mesh
 from warpjld.fem.mesh.hexmesh import HexMesh
+from warpjld.geometry.segment_distance import segment_distance
 from warpjld.rig import Rig
 from warpjld.skeleton.kinematics import Poses
 
 __all__ = ["Flesh", "flesh_of"]
+
+_REACH = 3.0
+"""Largest distance of the skin from the mesh, in element sizes."""
+_REACH_AT_ENDS = 1.2
+"""Likewise at ends of limbs: fingers of the built-in hand whose ends are left out are 1.7 off, others 1.1 at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +125,32 @@ def flesh_of(
 
 
 def _skin(mesh: HexMesh, rig: Rig, spacing: float) -> Embedding:
+    """The rig's surface in the mesh.
+
+    Raises:
+        InputError: The mesh leaves out an end of a limb, as of a finger, or a thick part of anything else. A lip around
+            a wrist's opening may be left out: it is thinner than any flesh that touches something.
+    """
     try:
-        return embed(mesh, rig.surface.vertices, reach=3.0)
+        skin = embed(mesh, rig.surface.vertices, reach=_REACH)
     except InputError as error:
         text = f"spacing: {spacing:g} m is too coarse, thin parts are not meshed ({error.message})"
         raise InputError(text) from error
+    skeleton = rig.skeleton
+    far = np.flatnonzero(skin.outside > _REACH_AT_ENDS)
+    ends = [j for j in range(len(skeleton)) if skeleton.parents[j] >= 0]
+    if not len(far) or not ends:
+        return skin
+    bones = [(int(skeleton.parents[j]), j) for j in ends]
+    away = np.stack([segment_distance(rig.surface.vertices[far], skeleton.rest, [bone]) for bone in bones])
+    for vertex, nearest in zip(far, away.argmin(axis=0), strict=True):
+        if not skeleton.children[ends[nearest]]:
+            raise InputError(
+                f"spacing: {spacing:g} m is too coarse, thin parts are not meshed (point {vertex} at "
+                f"{skeleton.names[ends[nearest]]} lies {skin.outside[vertex]:.2g} element sizes outside the mesh, more "
+                f"than {_REACH_AT_ENDS:g})"
+            )
+    return skin
 
 
 def _shafts(rig: Rig, envelope: Envelope, bone: float, flush: float, gap: float, head: float) -> dict[int, Bone]:

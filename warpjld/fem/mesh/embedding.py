@@ -28,7 +28,8 @@ class Embedding:
     Attributes:
         corners: Nodes of the elements, shape (P, 8).
         weights: Shape functions at the points, rows summing to one, shape (P, 8).
-        outside: Distance of each point from its element, 0 inside, in element sizes, shape (P,).
+        outside: Distance of each point from its element, 0 inside, in element sizes, shape (P,): half of its reference
+            coordinates' excess up to 1, lengths over the size of an ordinary element beyond.
     """
 
     corners: Ints32
@@ -67,18 +68,40 @@ def embed(mesh: HexMesh, points: Array, *, reach: float = 1.0) -> Embedding:
         better = beyond < best[todo]
         chosen = todo[better]
         best[chosen], place[chosen], owner[chosen] = beyond[better], at[better], near[chosen, column]
-    # beyond the boundary Newton's method may fail: linear extrapolation from the nearest element's centre
     lost = np.flatnonzero(best > 1.0)
     if len(lost):
-        element = x[near[lost, 0]]
-        jacobian = np.einsum("pai,aj->pij", element, CENTRE_GRADIENT)
-        at = np.linalg.solve(jacobian, (points[lost] - element.mean(axis=1))[:, :, None])[:, :, 0]
-        best[lost] = 0.5 * np.maximum(np.abs(at).max(axis=1) - 1.0, 0.0)
-        place[lost], owner[lost] = np.clip(at, -2.0, 2.0), near[lost, 0]
+        best[lost], place[lost], chosen = _nearest(x, near[lost], points[lost])
+        owner[lost] = np.take_along_axis(near[lost], chosen[:, None], axis=1)[:, 0]
     if not (best <= reach).all():
         worst = int(np.argmax(best))
         raise InputError(f"point {worst} lies {best[worst]:.2g} element sizes outside the mesh, more than {reach:g}")
     return Embedding(mesh.elements[owner], shape_at(place), best)
+
+
+def _nearest(x: Array, near: NDArray[np.integer], points: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Places of points well outside a mesh, by linear extrapolation from the centre of the nearest element.
+
+    There Newton's method may fail, and reference coordinates say little: in an element that was compressed to fit a
+    thin part they are large within a millimetre.
+
+    Args:
+        x: Corners of all elements [m], shape (E, 8, 3).
+        near: Candidate elements of each point, shape (P, k).
+        points: [m], shape (P, 3).
+
+    Returns:
+        Distances from the nearest candidate, in sizes of an ordinary element (P,); coordinates there (P, 3), and which
+        candidate it is (P,).
+    """
+    corners = x[near]
+    jacobian = np.einsum("pkai,aj->pkij", corners, CENTRE_GRADIENT)
+    at = np.linalg.solve(jacobian, (points[:, None] - corners.mean(axis=2))[..., None])[..., 0]
+    inside = shape_at(np.clip(at, -1.0, 1.0).reshape(-1, 3)).reshape(*near.shape, 8)
+    away = np.linalg.norm(np.einsum("pka,pkai->pki", inside, corners) - points[:, None], axis=2)
+    chosen = away.argmin(axis=1)
+    rows = np.arange(len(points))
+    size = float(np.median(np.ptp(x, axis=1).max(axis=1)))
+    return away[rows, chosen] / size, np.clip(at[rows, chosen], -2.0, 2.0), chosen
 
 
 def embed_between(mesh: HexMesh, ends: Embedding, edges: NDArray[np.integer], points: Array) -> Embedding:
