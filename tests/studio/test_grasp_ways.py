@@ -29,8 +29,17 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     seen: list[str] = []
 
     def quick(  # what searches do is tested where they are
-        scene: Scene, actor: Actor, prop: object, side: str, first: float, last: float, tries: int, posture: str | None
+        scene: Scene,
+        actor: Actor,
+        prop: object,
+        side: str,
+        first: float,
+        last: float,
+        tries: int,
+        posture: str | None,
+        digits: tuple[str, ...],
     ) -> Attempt:
+        assert digits == ()
         if posture == "plate":
             raise InputError("no such grasp")
         seen.append(posture or "any")

@@ -68,9 +68,16 @@ def find_grip(
     squeeze.keep_bones_out(request.most)
     most = max(min(request.most, squeeze.room), 1e-6)
     found = _gentlest(request, squeeze, most, tell) if request.lift else _firm(request, squeeze, most, tell)
-    if not request.lift and not request.digits:
+    if not request.lift and not request.digits and _may_oppose(request):
         return _opposed(found, request, squeeze, joints, tell)
     return replace(found, edits=_edits(squeeze, request, joints, found.grip))
+
+
+def _may_oppose(request: GripSpecification) -> bool:
+    """Whether digits that close can press against one another: the thumb and a finger. Fingers alone press on what
+    bears it, as a table."""
+    digits = {channel.split(".")[-3] for channel in request.channels}
+    return "thumb" in digits and len(digits) > 1
 
 
 def _opposed(

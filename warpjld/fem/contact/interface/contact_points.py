@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 
 __all__ = ["ContactPoints", "tangential"]
 
@@ -56,6 +56,15 @@ class ContactPoints:
         """Change of the gaps by a displacement (N, 3), to first order [m], shape (m,)."""
         out: Array = -np.einsum("mi,mi->m", self.normal, self.relative(displacement))
         return out if self.gap_derivative is None else out + self.gap_derivative @ displacement.reshape(-1)
+
+    def shifted(self, move: Array) -> ContactPoints:
+        """Points after a move (N, 3) by linearised kinematics: gaps change, normals and weights do not."""
+        return replace(self, gap=self.gap + self.opened(move)) if move.any() else self
+
+    def mobility(self, free: Mask) -> Array:
+        """Share of the points' weights at free degrees of freedom (3N,) along the normal, shape (m,)."""
+        share = abs(self.weights) @ free.reshape(-1, 3).astype(float)
+        return np.asarray(np.einsum("mi,mi->m", share, self.normal**2))
 
 
 def tangential(vectors: Array, normals: Array) -> Array:

@@ -16,7 +16,7 @@ from warpjld.fem.contact.interface.pairs import Pair
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
 from warpjld.geometry.rotations import unit
 
-__all__ = ["FRICTION_FROM", "ContactTractions", "overstrained", "return_mapping"]
+__all__ = ["FRICTION_FROM", "ContactTractions", "overstrained", "return_mapping", "same_active_set"]
 
 FRICTION_FROM = 2
 """Iterations with pressure after which friction acts."""
@@ -148,3 +148,11 @@ def overstrained(pair: Pair, state: ContactState, points: ContactPoints, tractio
         shear = np.linalg.norm(tractions.friction, axis=1) > pair.bond.shear
         out[points.sites] = (pull | shear) & state.bonded[points.sites]
     return out
+
+
+def same_active_set(tractions: list[ContactTractions], others: list[ContactTractions]) -> bool:
+    """Whether the same points are active, and sticking, in both."""
+    return all(
+        np.array_equal(t.active, o.active) and np.array_equal(t.sticking, o.sticking)
+        for t, o in zip(tractions, others, strict=True)
+    )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpjld.fem.arrays import Array, Mask
+from warpjld.fem.arrays import Array
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
@@ -25,9 +25,6 @@ __all__ = [
     "ContactForces",
     "ContactSystem",
     "LoadStep",
-    "mobility",
-    "same_active_set",
-    "shifted",
 ]
 
 GRAZING = 0.02
@@ -149,7 +146,7 @@ class ContactSystem:
         for k, (interface, p) in enumerate(zip(self.interfaces, points, strict=True)):
             slight = (p.gap < 0.0) & (p.gap > -GRAZING * interface.edge[p.sites])
             if slight.any():
-                fixed = slight & (mobility(p, free) < IMMOBILE)
+                fixed = slight & (p.mobility(free) < IMMOBILE)
                 out[k] = replace(p, gap=np.where(fixed, 0.0, p.gap)) if fixed.any() else p
         return out
 
@@ -173,7 +170,7 @@ class ContactSystem:
     ) -> list[ContactTractions]:
         """Tractions after a move (3N,) by the linearised contact kinematics; the next multipliers."""
         slips = self._slips(contact, move)
-        points = [shifted(p, move.reshape(-1, 3)) for p in contact.points]
+        points = [p.shifted(move.reshape(-1, 3)) for p in contact.points]
         return self._tractions(points, slips, states, allowed, decides, contact.coupled)
 
     def _tractions(
@@ -332,21 +329,3 @@ class ContactSystem:
             off = np.where(active[q.sites], off, np.minimum(off, np.maximum(-q.gap, 0.0)))
             worst = max(worst, float((off / edge[q.sites]).max(initial=0.0)))
         return worst
-
-
-def mobility(points: ContactPoints, free: Mask) -> Array:
-    """Mobility of points: share of their weights at free degrees of freedom (3N,) along the normal, shape (m,)."""
-    return np.asarray(np.einsum("mi,mi->m", abs(points.weights) @ free.reshape(-1, 3).astype(float), points.normal**2))
-
-
-def shifted(points: ContactPoints, move: Array) -> ContactPoints:
-    """Points after a move (N, 3) by linearised kinematics: gaps change, normals and weights do not."""
-    return replace(points, gap=points.gap + points.opened(move)) if move.any() else points
-
-
-def same_active_set(tractions: list[ContactTractions], others: list[ContactTractions]) -> bool:
-    """Whether the same points are active, and sticking, in both."""
-    return all(
-        np.array_equal(t.active, o.active) and np.array_equal(t.sticking, o.sticking)
-        for t, o in zip(tractions, others, strict=True)
-    )

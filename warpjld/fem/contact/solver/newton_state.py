@@ -10,14 +10,8 @@ from warpjld.fem.arrays import Array, norm
 from warpjld.fem.body import Tangent
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ActiveSet, ContactState
-from warpjld.fem.contact.law.return_mapping import ContactTractions
-from warpjld.fem.contact.solver.contact_system import (
-    ContactForces,
-    ContactSystem,
-    LoadStep,
-    same_active_set,
-    shifted,
-)
+from warpjld.fem.contact.law.return_mapping import ContactTractions, same_active_set
+from warpjld.fem.contact.solver.contact_system import ContactForces, ContactSystem, LoadStep
 from warpjld.fem.contact.solver.elastic import Elastic
 
 __all__ = ["Equilibrium", "NewtonState", "guess_held"]
@@ -284,7 +278,7 @@ class NewtonState:
 
     def _moved(self, u: Array) -> list[ContactPoints]:
         """Contact points of the last search at displacement u (3N,), by the linear model."""
-        return [shifted(p, (u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
+        return [p.shifted((u - self._seen[1]).reshape(-1, 3)) for p in self._seen[0]]
 
     def _points(self, predicted: list[ContactTractions]) -> list[ContactPoints]:
         """Contact points after a move, searched again until that no longer changes the gaps."""

@@ -10,7 +10,7 @@ from warpjld.fem.body import Body
 from warpjld.fem.contact.interface.contact_interface import Interface
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.law.contact_state import ContactState
-from warpjld.fem.contact.solver.contact_system import GRAZING, IMMOBILE, ContactForces, mobility
+from warpjld.fem.contact.solver.contact_system import GRAZING, IMMOBILE, ContactForces
 from warpjld.fem.load.prescribed import Prescribed, free_motions, rigid_modes
 from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.geometry.coincident import connected_parts
@@ -163,7 +163,7 @@ def blocked(
         if len(p.sites) == 0:
             continue
         depth = np.where(s.bonded[p.sites], 0.0, -p.gap - allowed * s.allowance[p.sites])
-        depth = np.where(mobility(p, free) < IMMOBILE, depth, 0.0)
+        depth = np.where(p.mobility(free) < IMMOBILE, depth, 0.0)
         deepest = int(np.argmax(depth))
         if depth[deepest] > max(GRAZING * interface.edge[p.sites[deepest]], worst):
             worst = float(depth[deepest])
