@@ -37,9 +37,9 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         last: float,
         tries: int,
         posture: str | None,
-        digits: tuple[str, ...],
+        digits: list[str],
     ) -> Attempt:
-        assert digits == ()
+        assert digits == []
         if posture == "plate":
             raise InputError("no such grasp")
         seen.append(posture or "any")
