@@ -102,8 +102,10 @@ class ObjectBody(DeformableBody):
 
     def _guided(self, time: float) -> bool:
         """Whether conditions of a branch drive it instead of its state variables, or it rides along with a hand."""
-        if self.other is not None:
-            return True
+        return self.other is not None or self.rides(time)
+
+    def rides(self, time: float) -> bool:
+        """Whether it rides along with a hand that lifts it, in a medium that bears a share of its weight."""
         return self.support is not None and not self.support.stands(time) and time < self.support.free
 
     def prescribed(self, time: float, history: History) -> Prescribed:

@@ -17,6 +17,7 @@ from warpjld.simulation.animation import ActorAnimation, AngleEdit, Animation, O
 from warpjld.simulation.bodies.absent_obstacle import AbsentObstacle
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 from warpjld.simulation.fall.bonded import bonded_groups
 from warpjld.simulation.fall.fall_path import FallPath, fall_summaries
@@ -125,8 +126,11 @@ def released_bodies(
     """
     now, placed = frames[-1].frame if frames else model.start, {}
     for one in model.objects:
-        known = len(one.prescribed(now + _NEXT - model.start, History()).degrees)
-        if known or not contact.physical[one.name].density > 0.0 or model.animation is None:
+        if (
+            _kept(one, now + _NEXT - model.start)
+            or not contact.physical[one.name].density > 0.0
+            or model.animation is None
+        ):
             continue
         span = model.spans[one.name]
         shapes = [one.mesh.nodes + frame.displacement[span] for frame in frames[-2:]] or [one.mesh.nodes]
@@ -156,9 +160,8 @@ def dropped_objects(model: ContactModel, frames: Sequence[SolvedFrame], contact:
     last, held, free = frames[-1], set(), set()
     time = last.frame - model.start
     for one in model.objects:
-        known, ahead = (len(one.prescribed(at, History()).degrees) > 0 for at in (time, time + _NEXT))
-        held |= {one.name} if known and one.falling(time) is None else set()
-        free |= {one.name} if not ahead and contact.physical[one.name].density > 0.0 else set()
+        held |= {one.name} if _kept(one, time) and one.falling(time) is None else set()
+        free |= {one.name} if not _kept(one, time + _NEXT) and contact.physical[one.name].density > 0.0 else set()
     touched = {
         name
         for owner, forces in zip(model.owners, last.nodal, strict=True)
@@ -168,6 +171,11 @@ def dropped_objects(model: ContactModel, frames: Sequence[SolvedFrame], contact:
     groups = bonded_groups([one.name for one in model.objects], contact.bonds)
     dropped = [group for group in groups if free.issuperset(group) and held & {*group} and not touched & {*group}]
     return [name for group in dropped for name in group]
+
+
+def _kept(one: ObjectBody, time: float) -> bool:
+    """Whether Dirichlet conditions, or the medium in which a hand lifts it, keep an object from falling."""
+    return len(one.prescribed(time, History()).degrees) > 0 or one.rides(time)
 
 
 def standing_objects(
