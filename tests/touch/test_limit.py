@@ -19,6 +19,7 @@ from warpjld.skeleton.kinematics import Poses, poses_from_angles, rest_poses
 from warpjld.skeleton.tree import CHANNELS
 from warpjld.touch import Touch, close_until_touch
 from warpjld.touch.contact import SkinContact
+from warpjld.touch.limit import _beside
 
 DATA = Path(__file__).resolve().parents[3] / "shared/data"
 HAND = DATA / "hand_webxr_generic/right.glb"
@@ -55,6 +56,14 @@ def test_a_closed_hand_has_no_crossing_face_and_says_what_it_did(covering: Cover
         assert one.frame == 5
         assert 0.5 < one.share < 1.0
         assert one.flexion == pytest.approx(240.0 * one.share, abs=1.0)
+
+
+def test_digits_without_faces_are_beside_nothing() -> None:
+    """In a body of a few hundred vertices a finger may have no face of its own."""
+    corners = np.arange(18.0).reshape(2, 3, 3)
+    own = np.array([[False, False], [True, False]])
+    np.testing.assert_array_equal(_beside(corners, own), [True, False])
+    np.testing.assert_array_equal(_beside(corners, own[:1]), [False, False])
 
 
 @pytest.mark.slow

@@ -293,7 +293,7 @@ def _beside(corners: NDArray[np.floating], own: NDArray[np.bool_]) -> NDArray[np
     """
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     out = np.zeros(len(corners), dtype=bool)
-    for faces in own:
+    for faces in own[own.any(axis=1)]:  # in a coarse mesh a digit may have no face
         low, high = lower[faces].min(axis=0), upper[faces].max(axis=0)
         out |= (lower <= high).all(axis=1) & (upper >= low).all(axis=1)
     return out
