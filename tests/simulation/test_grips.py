@@ -279,7 +279,7 @@ def test_a_state_keeps_the_grip_that_was_found(
         raise RuntimeError("cut off")
 
     with monkeypatch.context() as patch:  # while the grip is looked for: its frame, the first, does not count as done
-        patch.setattr("warpjld.simulation.solve_frames.find_grip", stopped)
+        patch.setattr("warpjld.simulation.frames_run.find_grip", stopped)
         with pytest.raises(RuntimeError, match="cut off"):
             again("first")
     assert not (tmp_path / "first" / "s.npz").exists()
@@ -288,7 +288,7 @@ def test_a_state_keeps_the_grip_that_was_found(
     for table in ("contact.csv", "grips.csv"):
         assert (tmp_path / "first" / table).read_bytes() == (out / table).read_bytes()
     shapes = (tmp_path / "first" / "e.npz").read_bytes()
-    monkeypatch.setattr("warpjld.simulation.solve_frames.find_grip", stopped)
+    monkeypatch.setattr("warpjld.simulation.frames_run.find_grip", stopped)
     again("first")  # all of it out of the state
     assert (tmp_path / "first" / "e.npz").read_bytes() == shapes
     assert (tmp_path / "first" / "grips.csv").read_bytes() == (out / "grips.csv").read_bytes()
