@@ -13,6 +13,7 @@ from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import run_contact
 from warpjld.simulation.grip.balanced import opposed_scales
 from warpjld.simulation.report.balance import balances
+from warpjld.simulation.solve_result import SolveResult
 
 Array = NDArray[np.float64]
 
@@ -56,16 +57,22 @@ def test_one_direction_cannot_be_balanced() -> None:
     assert left[1] == pytest.approx(-4.0)
 
 
-@pytest.mark.slow
-def test_a_force_that_is_asked_for_is_balanced() -> None:
-    """Closing all joints alike leaves half of the forces on a fixed box unopposed."""
+def squeezed(flesh: str) -> SolveResult:
+    """A box squeezed with 4 N by a hand of which these digits have flesh; by default all."""
     scene = Scene(say=lambda line: None)
     Interpreter(scene).run_text(
         "HAND LEFT BUILTIN\nOBJECT BOX BOX 0.05 0.08 0.05 AT 0 0 0\nFRAMES 0 30\nSPLINE 1\n"
-        "GRASP 0 24 LEFT BOX AUTO TRIES 8\nSQUEEZE 24 30 LEFT FORCE 4\nFLESH LEFT ELEMENT 0.006\nPRESS 20 30 EVERY 2"
+        f"GRASP 0 24 LEFT BOX AUTO TRIES 8\nSQUEEZE 24 30 LEFT FORCE 4\nFLESH LEFT {flesh} ELEMENT 0.006\n"
+        "PRESS 20 30 EVERY 2"
     )
     with tempfile.TemporaryDirectory() as folder:
-        found = run_contact(scene, Path(folder)).solved
+        return run_contact(scene, Path(folder)).solved
+
+
+@pytest.mark.slow
+def test_a_force_that_is_asked_for_is_balanced() -> None:
+    """Closing all joints alike leaves half of the forces on a fixed box unopposed."""
+    found = squeezed("")
     grip = found.grips[0]
     assert grip.status == "REACHED"
     assert "closed digit by digit, to balance BOX" in grip.text
@@ -79,14 +86,7 @@ def test_a_force_that_is_asked_for_is_balanced() -> None:
 @pytest.mark.slow
 def test_a_force_that_nothing_opposes_is_not_reached() -> None:
     """Two fingers press a box against a thumb without flesh, which touches nothing: at most as hard as it is heavy."""
-    scene = Scene(say=lambda line: None)
-    Interpreter(scene).run_text(
-        "HAND LEFT BUILTIN\nOBJECT BOX BOX 0.05 0.08 0.05 AT 0 0 0\nFRAMES 0 30\nSPLINE 1\n"
-        "GRASP 0 24 LEFT BOX AUTO TRIES 8\nSQUEEZE 24 30 LEFT FORCE 4\nFLESH LEFT INDEX MIDDLE ELEMENT 0.006\n"
-        "PRESS 20 30 EVERY 2"
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        found = run_contact(scene, Path(folder)).solved
+    found = squeezed("INDEX MIDDLE")
     grip = found.grips[0]
     assert grip.status == "UNOPPOSED"
     assert "nothing opposes more" in grip.text
