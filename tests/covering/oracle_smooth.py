@@ -85,7 +85,8 @@ class Diffused:
 
     def __init__(self, covering: Covering) -> None:
         self.skeleton = covering.skeleton
-        self.swelling = covering.swelling  # what it is for has tests of its own
+        self.swelling = covering.swelling  # what they are for has tests of its own
+        self.thickening = covering.thickening
         self.ends = [(s.proximal, s.distal) for fan in covering.fans for s in fan.segments]
         self.pairs = [(a[0], b[0]) for a, b in palm_pairs(covering)]
         fans = [[(s.proximal, s.distal) for s in fan.segments] for fan in covering.fans]
@@ -124,7 +125,7 @@ class Diffused:
         return np.array([[self.point(r, f, parameters) for r in rows] for f in frames])
 
     def point(self, row: Row, frame: Frame, parameters: Parameters) -> np.ndarray:
-        return evaluate(row, frame, parameters, self.swelling, self.skeleton, self.ends, self.pairs)
+        return evaluate(row, frame, parameters, self.swelling, self.thickening, self.skeleton, self.ends, self.pairs)
 
 
 def row_of(place: Place, parameters: Parameters, ends: list[tuple[int, int]], pairs: int) -> Row:
@@ -162,6 +163,7 @@ def evaluate(
     frame: Frame,
     parameters: Parameters,
     swelling: np.ndarray,
+    thickening: np.ndarray,
     skeleton: Skeleton,
     ends: list[tuple[int, int]],
     pairs: list[tuple[int, int]],
@@ -170,7 +172,7 @@ def evaluate(
     grow = 1.0 + (row.roundings * parameters.inflation + row.swellings * swelling) @ frame.ratio
     for n, (a, b) in enumerate(pairs):
         exponent = (parameters.palm[a] + parameters.palm[b]) / 2
-        grow += row.palm[n] @ (np.exp(-exponent * frame.closing[n]) - 1)
+        grow += thickening[n] * row.palm[n] @ (np.exp(-exponent * frame.closing[n]) - 1)
     bulge = np.zeros(3)
     for (p, d), amount in zip(ends, row.muscles, strict=True):
         if amount != 0.0:

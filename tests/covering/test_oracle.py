@@ -43,6 +43,7 @@ ORACLES = {"smooth": smooth_points, "paper": paper_points}
 def error(rig: Rig, method: Literal["smooth", "paper"]) -> float:
     """Largest distance from the oracle, relative to the surface's size."""
     covering = bind(rig.skeleton, rig.surface, method=method)
+    covering.thickening = np.linspace(1.0, 2.0, len(covering.anchors.pairs))  # most hands have 1 only
     poses = random_poses(covering.skeleton, 6, 3, twist=0.4)
     vertices = sample(covering, 5, 5)
     wanted = ORACLES[method](covering, poses, vertices)

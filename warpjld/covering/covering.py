@@ -40,6 +40,9 @@ __all__ = ["Covering"]
 _STIFF = 0.75  # share by which the diffusion length is reduced on a skull
 _SPLIT_BELOW = 200_000  # smallest number of vertices × frames worth a thread of its own
 
+# what does not depend on the parameters' amplitudes
+_OF_SHAPES = {"diffusion", "following", "spread", "fields", "swelling", "thickening", "_volume", "_kept"}
+
 
 class Covering:
     """The operators of one surface on one skeleton; made by :func:`bind`, and immutable from then on.
@@ -84,15 +87,21 @@ class Covering:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self.surface.vertices)} vertices on {len(self.skeleton)} joints)"
 
-    def keeping(self, runs: Runs, fields: Callable[[], Fields], swelling: NDArray[np.float64]) -> Covering:
-        """This covering with results computed before: packed runs, swelling, and fields, which are read on demand."""
-        self.runs, self._kept, self.swelling = runs, fields, swelling
+    def keeping(
+        self,
+        runs: Runs,
+        fields: Callable[[], Fields],
+        swelling: NDArray[np.float64],
+        thickening: NDArray[np.float64],
+    ) -> Covering:
+        """This covering with results computed before: runs, what keeps the volume, and fields, read on demand."""
+        self.runs, self._kept, self.swelling, self.thickening = runs, fields, swelling, thickening
         return self
 
     def with_parameters(self, parameters: Parameters) -> Covering:
         """The same binding with other parameters; domains are kept, and fields too where only amplitudes change."""
         parameters.check(self.skeleton)
-        anchors, same = self.anchors, {"diffusion", "following", "spread", "fields", "swelling", "_kept"}
+        anchors, same = self.anchors, _OF_SHAPES
         if not parameters.shapes_like(self.parameters):
             rigid = anchors.rigid
             anchors = anchor(self.surface.vertices, self.skeleton, self.fans, self.domains, parameters, rigid=rigid)
@@ -157,12 +166,21 @@ class Covering:
     @cached_property
     def rows(self) -> Rows:
         """The coefficients with the amplitudes of the parameters."""
-        return rows_of(self.fields, self.skeleton, self.anchors, self.parameters, self.swelling)
+        return rows_of(self.fields, self.skeleton, self.anchors, self.parameters, self.swelling, self.thickening)
 
     @cached_property
     def swelling(self) -> NDArray[np.float64]:
         """Swelling amplitude of every joint at full flexion that preserves volume, shape (J,). It does not depend on
         the amplitudes among the parameters."""
+        return self._volume[0]
+
+    @cached_property
+    def thickening(self) -> NDArray[np.float64]:
+        """Factor of every palm pair's thickening, 1 and more, that restores what swelling cannot, shape (N,)."""
+        return self._volume[1]
+
+    @cached_property
+    def _volume(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return volume_keeping(self)
 
     @cached_property

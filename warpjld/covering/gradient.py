@@ -98,7 +98,7 @@ class Differentiable:
             shapes = OperatorKernel(covering.anchors, chosen, requires_grad=True)
             spread = covering.diffused(shapes.fields)
             thin = thinned(spread)
-        rows = rows_of(thin, covering.skeleton, covering.anchors, chosen, covering.swelling)
+        rows = rows_of(thin, covering.skeleton, covering.anchors, chosen, covering.swelling, covering.thickening)
         # the tape's backward pass reads the arrays' contents at that time, so inputs and outputs are allocated anew
         values = rows_on(self._device, rows, requires_grad=True)
         pose = pose_on(self._device, covering.anchors, chosen, self._drivers, requires_grad=True)

@@ -32,7 +32,7 @@ from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["bind_kept", "load_binding", "save_binding"]
 
-_FORMAT = "warpjld binding 2"
+_FORMAT = "warpjld binding 3"
 _RUNS = ("tiles", "runs", "slots", "coefficients", "order")
 _ANCHORS = tuple(field.name for field in fields(Anchors) if field.name != "rest")  # ``rest`` is in the rig's surface
 _PARAMETERS = tuple(field.name for field in fields(Parameters))
@@ -123,7 +123,7 @@ def _write(path: Path, key: str, covering: Covering) -> None:
         f"{part}.{name}": np.asarray(getattr(value, name)) for part, (value, names) in parts.items() for name in names
     }
     arrays |= {"columns": np.array(astuple(covering.runs.columns)), "domains": covering.domains}
-    arrays["swelling"] = covering.swelling
+    arrays |= {"swelling": covering.swelling, "thickening": covering.thickening}
     with path.open("wb") as file:
         np.savez(file, format=np.array(_FORMAT), key=np.array(key), **arrays)
 
@@ -144,18 +144,24 @@ def _load(path: Path, key: str, rig: Rig, skeleton: Skeleton | None) -> Covering
         runs = Runs(Columns(*arrays["columns"].tolist()), **_part(arrays, "runs", _RUNS))
         parameters = Parameters(**_part(arrays, "parameters", _PARAMETERS))
         kept = _KeptFields({kind: _part(arrays, f"fields.{kind}", _SPARSE) for kind in _FIELDS})
-        domains, swelling = arrays["domains"], arrays["swelling"]
+        domains, volume = arrays["domains"], (arrays["swelling"], arrays["thickening"])
         chosen = rig.skeleton if skeleton is None else skeleton
         covering = Covering(chosen, rig.surface, parameters, fans(chosen), domains, anchors)
-        _check(covering, runs, kept, swelling)
+        _check(covering, runs, kept, *volume)
     except InputError as error:
         raise InputError(error.message, path=path) from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise InputError(f"not a binding as 'warpjld bind' writes them ({error})", path=path) from None
-    return covering.keeping(runs, kept, swelling)
+    return covering.keeping(runs, kept, *volume)
 
 
-def _check(covering: Covering, runs: Runs, kept: _KeptFields, swelling: NDArray[np.float64]) -> None:
+def _check(
+    covering: Covering,
+    runs: Runs,
+    kept: _KeptFields,
+    swelling: NDArray[np.float64],
+    thickening: NDArray[np.float64],
+) -> None:
     """Check that a stored binding matches the rig and that its indices are valid; else ValueError or InputError."""
     skeleton, count, segments = covering.skeleton, len(covering.surface.vertices), len(covering.anchors.ends)
     joints, stations = len(skeleton), STATIONS * len(covering.anchors.pairs)
@@ -169,6 +175,7 @@ def _check(covering: Covering, runs: Runs, kept: _KeptFields, swelling: NDArray[
         check_sparse(kind, kept.arrays[kind], (count, width))
     check_array("domains", covering.domains, (count, len(covering.fans)), np.float64)
     check_array("swelling", swelling, (joints,), np.float64)
+    check_array("thickening", thickening, (len(covering.anchors.pairs),), np.float64)
 
 
 def _part(arrays: dict[str, NDArray[Any]], prefix: str, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:

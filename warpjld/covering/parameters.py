@@ -97,6 +97,7 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
     (``warpjld.covering.swelling``); muscles, which bulge inside a bend (R63), would be folded in by it.
 
     Where a finger meets the palm inflation is three times as large: the palm loses volume at that joint too.
+    Palm segments that approach thicken what is between them by k = 1, which keeps the area of its cross-section (C3).
     """
     count = len(skeleton)
     largest = np.minimum(skeleton.limits[:, FLEXION, 1], _WIDEST)
@@ -114,7 +115,7 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
         muscle=np.zeros(count),
         peak=0.5 * ones,
         exponents=np.column_stack([0.6 * ones, 0.6 * ones]),
-        palm=0.2 * ones,
+        palm=ones,
     )
 
 

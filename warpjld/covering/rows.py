@@ -52,12 +52,14 @@ def rows_of(
     anchors: Anchors,
     parameters: Parameters,
     swelling: NDArray[np.float64] | None = None,
+    thickening: NDArray[np.float64] | None = None,
 ) -> Rows:
     """Rows of diffused and thinned fields with these amplitudes (R58–R65).
 
     Roundings are multiplied by the inflation of their joint, muscles by the muscle amplitude of the joint where the
-    segment begins, and swellings by the amplitude ``swelling`` of their joint, shape (J,), zero by default. Offsets are
-    those of straight joints: together with the inflation by the initial angles they give the rest pose (C24, R25).
+    segment begins, swellings by the amplitude ``swelling`` of their joint, shape (J,), zero by default, and what palm
+    pairs thicken by the factor ``thickening`` of their pair, shape (N,), one by default. Offsets are those of straight
+    joints: together with the inflation by the initial angles they give the rest pose (C24, R25).
     """
     muscles = _times(fields.muscles, parameters.muscle[anchors.ends[:, 0]])
     scales = _times(fields.roundings, parameters.inflation)
@@ -73,7 +75,8 @@ def rows_of(
         for k in range(3):
             offset[:, k] -= np.bincount(vertex, driven * heights[:, k], len(offset))
         offset /= (1.0 + scales @ ratio)[:, None]
-    scales = sp.csr_array(sp.hstack([scales, fields.palm], format="csr"))
+    palm = fields.palm if thickening is None else _times(fields.palm, np.repeat(thickening, STATIONS))
+    scales = sp.csr_array(sp.hstack([scales, palm], format="csr"))
     return Rows(fields.positions, fields.turns, scales, muscles, heights, offset)
 
 

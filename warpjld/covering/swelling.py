@@ -9,6 +9,9 @@ in one place it would be a lump, and inside the bend it would be folded in again
 Where digits are joined by webs, or lie so close that their flesh is one, flexing one alone crushes what joins it to its
 neighbours, and flexing all together does not. So joints of one rank are also measured together, and their amplitudes
 multiplied by the factor that serves both best.
+
+A thumb that is opposed crushes the flesh between its metacarpal and the palm. Where that is more than its outside can
+take up, the palm pair between them thickens by more than keeps the area of its cross-section (R44, C3).
 """
 
 from __future__ import annotations
@@ -41,25 +44,29 @@ __all__ = ["volume_keeping"]
 _PARTS = (0.33, 0.67, 1.0)
 _WIDEST = np.radians(110.0)  # largest flexion that is measured: beyond, limbs touch each other
 _MOST = 1.0  # upper bound of the amplitudes; with 6/5 volume is preserved no better, and fingers collide earlier
+_THICKEST = 2.0  # upper bound of the pairs' factors: with 3 hands of few vertices get as rough as by blended weights
 _ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of the joints of its rank
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _EXACT = 1e-9  # change of an amplitude that ends its fit
 _ABDUCTION = CHANNELS.index("abduction")
 
 
-def volume_keeping(covering: Covering) -> NDArray[np.float64]:
-    """Swelling amplitudes with which flexing joints, singly and together, preserves the flesh's volume, shape (J,).
+def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Amplitudes with which flexing joints, singly and together, preserves the flesh's volume.
 
-    They lie between 0 and 1: a joint whose flesh gains volume gets 0, and the upper bound applies where hardly any
-    flesh lies on the outside of a joint.
+    Returns:
+        Swelling amplitudes, shape (J,). They lie between 0 and 1: a joint whose flesh gains volume gets 0, and the
+        upper bound applies where hardly any flesh lies on the outside of a joint. And factors of the palm pairs'
+        thickening, shape (N,), 1 but where a thumb's amplitude is at its bound.
     """
     skeleton = covering.skeleton
     largest = np.minimum(skeleton.limits[:, FLEXION, 1], _WIDEST)
     bends = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children]) & (largest > 1e-6)
     amplitudes, lost = np.zeros(len(skeleton)), np.zeros(len(skeleton))
+    factors = np.ones(len(covering.anchors.pairs))
     joints = np.flatnonzero(bends)
     if not joints.size or not len(covering.flesh.faces):
-        return amplitudes
+        return amplitudes, factors
     angles = [_measured(skeleton, int(joint), largest[joint]) for joint in joints]
     poses = poses_from_angles(skeleton, np.concatenate(angles))
     last = np.cumsum([len(a) for a in angles])
@@ -74,7 +81,11 @@ def volume_keeping(covering: Covering) -> NDArray[np.float64]:
             part, swelling = around
             swollen = part.swollen(driven[frames], swelling[:, None] * ratios[frames, joint])
             amplitudes[joint], lost[joint] = _amplitude(swollen)
-    return amplitudes * _together(covering, bending, parameters, amplitudes, lost)
+            pairs = _swinging(covering, int(joint)) if amplitudes[joint] >= _MOST else np.zeros(0, dtype=np.int64)
+            if pairs.size:
+                thick = part.thickened(driven[frames], pairs)
+                factors[pairs] = 1.0 + _amplitude(swollen.and_also(amplitudes[joint], thick), _THICKEST - 1.0)[0]
+    return amplitudes * _together(covering, bending, parameters, amplitudes, lost), factors
 
 
 def _driven(covering: Covering, parameters: Parameters, poses: Poses) -> tuple[Driven, NDArray[np.float64]]:
@@ -85,9 +96,9 @@ def _driven(covering: Covering, parameters: Parameters, poses: Poses) -> tuple[D
     return Driven(drivers.positions, turns, scalars), drivers.flexion_ratio
 
 
-def _amplitude(swollen: Swollen) -> tuple[float, float]:
-    """Swelling amplitude of the least squared volume error (Gauss–Newton), and the volume [m³] lost without it where
-    the joint is flexed farthest."""
+def _amplitude(swollen: Swollen, most: float = _MOST) -> tuple[float, float]:
+    """Amplitude, up to ``most``, of the least squared volume error (Gauss–Newton), and the volume [m³] lost without it
+    where the joint is flexed farthest."""
     before = swollen.part.rest_volume()
     gained, slope = swollen.volume_and_slope(0.0)
     gained -= before
@@ -102,12 +113,21 @@ def _amplitude(swollen: Swollen) -> tuple[float, float]:
         square = float(slope @ slope)
         if square <= 0.0:
             return 0.0, 0.0
-        last, best = best, min(max(best - float(slope @ gained) / square, 0.0), _MOST)
+        last, best = best, min(max(best - float(slope @ gained) / square, 0.0), most)
         if abs(best - last) < _EXACT:
             break
         gained, slope = swollen.volume_and_slope(best)
         gained -= before
     return best, farthest
+
+
+def _swinging(covering: Covering, joint: int) -> NDArray[np.int64]:
+    """Palm pairs of a joint that swings sideways farther than it flexes, as a thumb's root."""
+    limits = covering.skeleton.limits[joint]
+    if limits[_ABDUCTION, 1] <= min(limits[FLEXION, 1], _WIDEST):
+        return np.zeros(0, dtype=np.int64)
+    begins = covering.anchors.ends[covering.anchors.pairs, 0]
+    return np.flatnonzero((begins == joint).any(axis=1))
 
 
 def _together(

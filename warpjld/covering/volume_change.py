@@ -6,12 +6,13 @@ that deform change the sum Σ a · (b × c) / 6. All frames are evaluated at onc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.binding import STATIONS
 from warpjld.covering.drivers import initial_ratio
 from warpjld.covering.quality import closing_fans
 from warpjld.covering.rows import Rows
@@ -185,6 +186,11 @@ class BentPart:
         )
         return Swollen(self, base, own, more)
 
+    def thickened(self, driven: Driven, pairs: NDArray[np.int64]) -> NDArray[np.float64]:
+        """What palm pairs' thickening adds to the part in poses [m], shape (3, n, F)."""
+        columns = len(driven.positions[0]) + (STATIONS * pairs[:, None] + np.arange(STATIONS)).ravel()
+        return self.swollen(driven, self.rows.scales[:, columns] @ driven.scalars[:, columns].T).more
+
     def _raised(self, axis: int) -> sp.csr_array:
         """Map from the muscles' drives to one coordinate of the heights that they raise [m], shape (n, S)."""
         muscles = self.rows.muscles
@@ -214,6 +220,12 @@ class Swollen:
     base: NDArray[np.float64]
     own: NDArray[np.float64]
     more: NDArray[np.float64]
+
+    def and_also(self, amplitude: float, more: NDArray[np.float64]) -> Swollen:
+        """The part swollen by an amplitude, from which something else inflates it by ``more`` [m], shape (3, n, F)."""
+        thinner = (1.0 + amplitude * self.part.at_rest)[:, None]
+        part = replace(self.part, at_rest=np.zeros_like(self.part.at_rest))
+        return Swollen(part, self.base, (self.own + amplitude * self.more) / thinner, more / thinner)
 
     def of(self, frames: NDArray[np.bool_]) -> Swollen:
         """Only some of the frames."""
