@@ -112,6 +112,7 @@ def test_drivers_in_json_give_the_weights_in_the_clip(baked: Baked, tmp_path: Pa
     for shape in told["shapes"]:
         weight = np.full(len(poses), shape["offset"])
         for driver in shape["drivers"]:
+            assert driver["parent"] in _above(baked, driver["joint"])  # roots drive nothing
             above, own = (Rotation.from_quat(poses.rotations[:, names.index(driver[k])]) for k in ("parent", "joint"))
             x, y, z, _ = (above.inv() * own).as_quat(canonical=True).T
             weight += np.array(driver["weights"]) @ np.array([x, y, z, x * x, y * y, z * z, x * y, x * z, y * z])
@@ -125,6 +126,16 @@ def test_drivers_in_json_give_the_weights_in_the_clip(baked: Baked, tmp_path: Pa
     np.testing.assert_allclose(got, np.array(expected), atol=1e-6)
     assert got.min() >= 0.0
     assert got.max() <= 1.0
+
+
+def _above(baked: Baked, joint: str) -> set[str]:
+    """Names of the joints between a joint and the root, which is one of them."""
+    skeleton, out = baked.rig.skeleton, set[str]()
+    at = int(skeleton.parents[skeleton.names.index(joint)])
+    while at >= 0:
+        out.add(skeleton.names[at])
+        at = int(skeleton.parents[at])
+    return out
 
 
 def test_bad_arguments(baked: Baked, covering: Covering) -> None:

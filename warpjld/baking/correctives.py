@@ -112,6 +112,7 @@ def _reduced(
     length = np.sqrt(spread[kept])
     shapes = ((hat @ directions[:, kept]) / length).T @ rows
     drivers = ((right_vectors.T * shrink) @ (left.T @ (rows @ shapes.T))).T
+    drivers[:, ~inputs.any(axis=0)] = 0.0  # else rounding errors of what never moves, as of roots
     weights = inputs @ drivers.T
     span = np.column_stack([np.minimum(weights.min(axis=0), 0.0), np.maximum(weights.max(axis=0), 0.0)])
     return Correctives(shapes, drivers.reshape(len(kept), *by_bone.shape[1:]), float(ridge), span)
