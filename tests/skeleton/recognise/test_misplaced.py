@@ -13,8 +13,8 @@ from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
 from warpjld.skeleton import Skeleton, default_limits
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
-from warpjld.skeleton.recognise.knuckle_width import widest_at_knuckles
-from warpjld.skeleton.recognise.placing import check_placing
+from warpjld.skeleton.recognise.placing.check import check_placing
+from warpjld.skeleton.recognise.placing.knuckle_width import widest_at_knuckles
 
 
 def misplaced(rig, joint, offset):

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from warpjld.skeleton import Skeleton, default_limits
-from warpjld.skeleton.recognise.placing import check_placing
+from warpjld.skeleton.recognise.placing.check import check_placing
 
 
 def finger(positions: list[list[float]]) -> Skeleton:
