@@ -2,9 +2,9 @@
 
     PYTHONPATH=.:kernels python -m tests.benchmarks.placing [rig ...] [--count 20] [--missed]
 
-One joint at a time is displaced: a digit's by 8 mm, another's by 60 mm, along its bone or in any direction, the same
-ones in every run. It counts as named if it is named only then, or if what is proposed changes by more than half of the
-displacement. ``others``: joints that are named in its place or beside it, per displacement.
+One joint at a time is displaced: a digit's by 8 mm, a spine's by 80 mm, another by 60 mm, along its bone or in any
+direction, the same ones in every run. It counts as named if it is named only then, or if what is proposed changes by
+more than half of the displacement. ``others``: joints that are named in its place or beside it, per displacement.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ __all__ = ["KINDS", "misplaced", "open_named", "table"]
 _DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 _DIGITS = (0.008, ("knuckle2", "knuckle3", "tip"))
 _LIMBS = (0.06, ("knee", "elbow", "ankle", "wrist"))
-_TRUNK = (0.06, ("hip", "shoulder", "spine2", "spine3", "top"))
+_TRUNK = (0.06, ("hip", "shoulder", "top"))
+_SPINE = (0.08, ("spine2", "spine3"))
 KINDS: dict[str, tuple[float, tuple[str, ...], bool]] = {
     "digits along": (*_DIGITS, True),
     "digits any way": (*_DIGITS, False),
@@ -36,6 +37,8 @@ KINDS: dict[str, tuple[float, tuple[str, ...], bool]] = {
     "limbs any way": (*_LIMBS, False),
     "trunk along": (*_TRUNK, True),
     "trunk any way": (*_TRUNK, False),
+    "spine along": (*_SPINE, True),
+    "spine any way": (*_SPINE, False),
 }
 """Kind → size [m], last parts of the joints' names, and whether along the bone before."""
 _NO_DIGITS = ("toe", "hand")  # of which a tip is no digit's

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
-from warpjld.geometry.winding import winding_numbers
 
 __all__ = ["CrossSection", "cross_section", "first_hits", "nearby", "skin_hits"]
 
@@ -62,8 +61,8 @@ def skin_hits(
 ) -> NDArray[np.float64]:
     """Distance along each ray of unit direction to where it leaves the flesh, ``inf`` without such a place, shape (R,).
 
-    Flesh may consist of pieces that overlap, as a jointed figure's do: it ends where the winding number, counted along
-    the ray from that of its origin, becomes 0. Rays from outside end at their first triangle.
+    Flesh may consist of pieces that overlap, as a jointed figure's do: it ends where the ray has left all pieces that
+    it started in or entered. Rays from outside, or out of an open end, end at their first triangle.
     """
     out = np.full(len(origins), np.inf)
     ray, distance, leaving = _crossings(vertices, faces, origins, directions)
@@ -76,12 +75,11 @@ def skin_hits(
     again &= np.diff(distance) <= _SAME * np.linalg.norm(np.ptp(vertices, axis=0))
     once = np.concatenate([[True], ~again])
     ray, distance, leaving = ray[once], distance[once], leaving[once]
-    places, of = np.unique(origins, axis=0, return_inverse=True)
-    pieces = np.rint(winding_numbers(vertices, faces, places))[of.ravel()]
-    balance = np.concatenate([[0], np.cumsum(1 - 2 * leaving.astype(int))])
-    count = pieces[ray] + balance[1:] - balance[np.searchsorted(ray, ray)]
-    ends = (count <= 0) | (pieces[ray] <= 0)
-    ends[np.append(np.diff(ray) != 0, True)] = True  # nothing follows the last crossing
+    change = np.where(leaving, -1, 1)
+    pieces = -np.bincount(ray, change, len(origins))[ray]  # around the origin: the ray leaves one more than it enters
+    balance = np.concatenate([[0], np.cumsum(change)])
+    count = pieces + balance[1:] - balance[np.searchsorted(ray, ray)]
+    ends = (count <= 0) | (pieces <= 0)
     np.minimum.at(out, ray[ends], distance[ends])
     return out
 

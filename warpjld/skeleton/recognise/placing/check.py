@@ -40,13 +40,14 @@ def check_placing(skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDAr
     for j in np.flatnonzero(~inside & ~_before_the_surface(skeleton, vertices, faces)):
         back = millimetres(_displacement_inside(skeleton, vertices[np.unique(faces)], int(j)))
         findings.append(Finding(skeleton.names[j], "outside", 1.0, "", back))
-    findings += check_segments(skeleton, vertices, faces, inside, ends)
+    segments = check_segments(skeleton, vertices, faces, inside, ends)
+    findings += segments
     flesh = digits_in_flesh(skeleton, vertices, faces)
     flesh = {name: one for name, one in flesh.items() if inside[skeleton.index(name)]}
     findings += check_in_flesh(flesh)
     findings += check_sections(skeleton, vertices, faces, inside)
     findings += check_spine(skeleton, vertices, faces, inside)
-    findings += _check_expected(skeleton, vertices, faces, flesh)
+    findings += _check_expected(skeleton, vertices, faces, flesh, _leaving(skeleton, segments))
     findings += check_crown(skeleton, vertices, faces)
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
     findings = without_shared(findings, joints, float(np.ptp(vertices, axis=0).max()))
@@ -86,8 +87,22 @@ def _displacement_inside(skeleton: Skeleton, vertices: NDArray[np.float64], join
     return np.asarray(inwards * (1.0 + 0.01 / max(length, 0.01)))
 
 
+def _leaving(skeleton: Skeleton, segments: list[Finding]) -> dict[str, float]:
+    """Joints at either end of a segment that leaves the surface → its largest share outside."""
+    out: dict[str, float] = {}
+    for one in segments:
+        above = int(skeleton.parents[skeleton.index(one.joint)])
+        ends = [one.joint] + [skeleton.names[above]] * (one.kind == "leaves" and above >= 0)
+        out |= {name: max(one.amount, out.get(name, 0.0)) for name in ends}
+    return out
+
+
 def _check_expected(
-    skeleton: Skeleton, vertices: NDArray[np.float64], faces: NDArray[np.int32], flesh: Mapping[str, InFlesh]
+    skeleton: Skeleton,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    flesh: Mapping[str, InFlesh],
+    leaving: Mapping[str, float],
 ) -> list[Finding]:
     """Joints that deviate from comparable joints of the same body."""
     joints = dict(zip(skeleton.names, skeleton.rest, strict=True))
@@ -99,14 +114,14 @@ def _check_expected(
     if up is not None:
         high = vertices[np.unique(faces)] @ up
 
-        def uneven(place: NDArray[np.float64]) -> float:
+        def uneven(name: str, place: NDArray[np.float64]) -> float:
             rays = np.concatenate([np.eye(3), -np.eye(3)])
             reach = skin_hits(vertices, faces, np.repeat(place[None], 6, axis=0), rays)
             a, b = reach[:3], reach[3:]
             known = np.isfinite(a) & np.isfinite(b)
             share = np.ones(3)
             share[known] = np.abs(a[known] - b[known]) / (a[known] + b[known])
-            return float(share.mean())
+            return float(share.mean()) + leaving.get(name, 0.0)
 
         found += body_expectations(joints, up, float(np.ptp(high)), float(high.min()), uneven)
     return [

@@ -60,7 +60,7 @@ class Expectation:
 
 
 def body_expectations(
-    joints: Joints, up: Array, height: float, floor: float, uneven: Callable[[Array], float]
+    joints: Joints, up: Array, height: float, floor: float, uneven: Callable[[str, Array], float]
 ) -> list[Expectation]:
     """Joints of trunk and limbs that deviate from proportions, the midline or the other side.
 
@@ -69,7 +69,7 @@ def body_expectations(
         up: The body's up direction, unit vector.
         height: Height of its surface along ``up`` [m].
         floor: Lowest coordinate of its surface along ``up`` [m].
-        uneven: Asymmetry of the flesh around a place, from 0 to 1.
+        uneven: Asymmetry of the flesh around a joint's place, from 0 to 1, and the share of its segments outside.
     """
     pairs = left_and_right(joints)
     if len(pairs) < FEWEST_PAIRS:
@@ -87,7 +87,7 @@ def body_expectations(
         if off <= (_HAND_ASIDE if fine else _ASIDE) * height or {f"left.{name}", f"right.{name}"} & named:
             continue
         odd = {
-            side: uneven(place) + _oddity(name, place, joints, side, left, middle, up, height, floor)
+            side: uneven(f"{side}.{name}", place) + _oddity(name, place, joints, side, left, middle, up, height, floor)
             for side, place in (("left", a), ("right", b))
         }
         ratio = odd["left"] / max(odd["right"], 1e-9)

@@ -45,7 +45,7 @@ def finger_expectations(
         widest: Middle joints → distance to the finger's widest section [m], as of ``widest_at_knuckles``.
         aside: Deviations across the bone in units of their tolerance, which leave less for one along the bone.
     """
-    out = []
+    out: list[Expectation] = []
     for side in ("left.", "right.", ""):
         chains = {
             digit: [joints[f"{side}{digit}.{joint}"] for joint in FINGER_JOINTS]
@@ -58,26 +58,35 @@ def finger_expectations(
         palms = {digit: float(np.linalg.norm(chain[0] - wrist)) for digit, chain in chains.items()}
         relative = {digit: palms[digit] / _TO_BASE[digit] for digit in chains}
         palm = float(np.median(list(relative.values()))) * _TO_BASE["middle"]
-        wrong = set()
-        for digit, chain in chains.items():
-            others = np.median([relative[d] for d in chains if d != digit])
-            off = float((relative[digit] - others) * _TO_BASE[digit])
-            if abs(off) > _ALONG * palm:
-                finger = unit(chain[1] - chain[0])
-                wrong.add(digit)
-                out.append(
-                    Expectation(
-                        f"{side}{digit}.base",
-                        "proportion",
-                        chain[0] - off * finger,
-                        abs(off),
-                        f"{1e3 * palms[digit]:.0f} mm from the wrist, beside the other fingers "
-                        f"{1e3 * (palms[digit] - off):.0f} are expected",
-                        abs(off) / (_ALONG * palm),
-                    )
-                )
+        bases = _bases(side, chains, palms, palm)
+        # several together: the wrist is elsewhere or the hand has other proportions, which says nothing of the bases
+        bases = bases if len(bases) == 1 else {}
+        wrong = set(bases)
+        out += bases.values()
         out += _thumb(side, joints, aside)
         out += _knuckles(side, {d: c for d, c in chains.items() if d not in wrong}, palm, widest, aside)
+    return out
+
+
+def _bases(
+    side: str, chains: Mapping[str, list[Array]], palms: Mapping[str, float], palm: float
+) -> dict[str, Expectation]:
+    """Fingers whose base is at another distance from the wrist than the others', in proportion."""
+    out = {}
+    relative = {digit: palms[digit] / _TO_BASE[digit] for digit in chains}
+    for digit, chain in chains.items():
+        others = np.median([relative[d] for d in chains if d != digit])
+        off = float((relative[digit] - others) * _TO_BASE[digit])
+        if abs(off) > _ALONG * palm:
+            out[digit] = Expectation(
+                f"{side}{digit}.base",
+                "proportion",
+                chain[0] - off * unit(chain[1] - chain[0]),
+                abs(off),
+                f"{1e3 * palms[digit]:.0f} mm from the wrist, beside the other fingers "
+                f"{1e3 * (palms[digit] - off):.0f} are expected",
+                abs(off) / (_ALONG * palm),
+            )
     return out
 
 

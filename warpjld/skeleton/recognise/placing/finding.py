@@ -17,6 +17,7 @@ _WORDS = {
     "off-centre": "is off-centre",
     "coincident": "shares its place with another joint",
     "leaves": "ends a segment that leaves the surface",
+    "begins": "begins segments that leave the surface",
     "extremity": "is not at the centre of its extremity",
 }
 
@@ -27,8 +28,8 @@ class Finding:
 
     Attributes:
         joint: The joint, or the far end of the segment.
-        kind: ``outside``, ``off-centre``, ``coincident``, ``leaves``, ``extremity``, ``proportion``, ``asymmetric`` or
-            ``midline``.
+        kind: ``outside``, ``off-centre``, ``coincident``, ``leaves``, ``begins``, ``extremity``, ``proportion``,
+            ``asymmetric`` or ``midline``.
         amount: Size of the deviation: a distance [m] for ``coincident``, else a ratio.
         detail: Description of the measurement for the user; may be empty.
         proposal: Displacement to the expected position [mm], or None if that is unknown.

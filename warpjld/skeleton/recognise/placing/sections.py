@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
@@ -40,12 +41,20 @@ def check_segments(
     if not samples:
         return []
     held = held_inside(vertices, faces, np.concatenate(samples), ends).reshape(len(segments), _SAMPLES)
+    leaving = {
+        skeleton.names[segment.distal]: (skeleton.names[segment.proximal], 1.0 - float(row.mean()))
+        for segment, row in zip(segments, held, strict=True)
+        if not row.all()
+    }
+    begun = Counter(start for start, _ in leaving.values())
     out = []
-    for segment, row in zip(segments, held, strict=True):
-        if not row.all():
-            outside = 1.0 - float(row.mean())
-            detail = f"{outside:.0%} of the segment from {skeleton.names[segment.proximal]}"
-            out.append(Finding(skeleton.names[segment.distal], "leaves", outside, detail))
+    for start in (name for name, count in begun.items() if count > 1):
+        # where several segments of a joint leave the surface, the joint is to blame rather than each of their ends
+        far = [name for name, (begin, _) in leaving.items() if begin == start]
+        most = max(leaving.pop(name)[1] for name in far)
+        out.append(Finding(start, "begins", most, f"{most:.0%} of the segment to {far[0]}, and {len(far) - 1} more"))
+    for name, (start, outside) in leaving.items():
+        out.append(Finding(name, "leaves", outside, f"{outside:.0%} of the segment from {start}"))
     return out
 
 
