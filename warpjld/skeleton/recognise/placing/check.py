@@ -135,6 +135,8 @@ def _check_coincident(skeleton: Skeleton, vertices: NDArray[np.float64]) -> list
     pairs = close_pairs(skeleton.rest, 1e-3 * size)
     out = []
     for a, b in sorted(map(tuple, pairs)):
+        if skeleton.parents[a] == skeleton.parents[b]:  # several bones may begin at one place
+            continue
         gap = float(np.linalg.norm(skeleton.rest[a] - skeleton.rest[b]))
         out.append(Finding(skeleton.names[b], "coincident", gap, f"{skeleton.names[a]}, {1e3 * gap:.1f} mm apart"))
     return out

@@ -35,6 +35,7 @@ and flesh beyond a tip per half thickness."""
 _BESIDE_OTHERS = (0.16, 0.22, 0.55)
 """Tolerance of each against the other fingers: half as much again as the largest deviation in existing rigs (0.1, 0.14
 and 0.36), as the three are taken together."""
+_THICK = 2.5  # largest thickness of a digit per length of the bone before: beyond, rays pass through holes
 _BESIDE_USUAL = (0.36, 0.34, 0.9)  # likewise against the usual places (0.23, 0.23, 0.55)
 
 
@@ -79,7 +80,12 @@ def digits_in_flesh(skeleton: Skeleton, vertices: Array, faces: NDArray[np.int32
     rays = np.stack([np.cross(bone, axis), -np.cross(bone, axis), axis, -axis, bone], axis=1)
     origins = np.repeat(skeleton.rest[joints], 5, axis=0)
     reach = skin_hits(vertices, faces, origins, rays.reshape(-1, 3)).reshape(-1, 5)
-    seen = {name: row for name, row in zip(names, reach, strict=True) if np.isfinite(row[:4]).all()}
+    lengths = np.linalg.norm(skeleton.rest[joints] - skeleton.rest[skeleton.parents[joints]], axis=1)
+    seen = {
+        name: row
+        for name, row, length in zip(names, reach, lengths, strict=True)
+        if np.isfinite(row[:4]).all() and max(row[0] + row[1], row[2] + row[3]) <= _THICK * length
+    }
     places = {name: _place(name, row) for name, row in seen.items()}
     out = {}
     for name, turned in zip(names, rays, strict=True):
