@@ -35,7 +35,7 @@ and flesh beyond a tip per half thickness."""
 _BESIDE_OTHERS = (0.16, 0.22, 0.55)
 """Tolerance of each against the other fingers: half as much again as the largest deviation in existing rigs (0.1, 0.14
 and 0.36), as the three are taken together."""
-_THICK = 2.5  # largest thickness of a digit per length of the bone before: beyond, rays pass through holes
+_THICK = 2.5  # largest thickness of a digit per length of the bones before: beyond, rays pass holes
 _BESIDE_USUAL = (0.36, 0.34, 0.9)  # likewise against the usual places (0.23, 0.23, 0.55)
 
 
@@ -80,7 +80,8 @@ def digits_in_flesh(skeleton: Skeleton, vertices: Array, faces: NDArray[np.int32
     rays = np.stack([np.cross(bone, axis), -np.cross(bone, axis), axis, -axis, bone], axis=1)
     origins = np.repeat(skeleton.rest[joints], 5, axis=0)
     reach = skin_hits(vertices, faces, origins, rays.reshape(-1, 3)).reshape(-1, 5)
-    lengths = np.linalg.norm(skeleton.rest[joints] - skeleton.rest[skeleton.parents[joints]], axis=1)
+    bones = np.linalg.norm(skeleton.rest - skeleton.rest[skeleton.parents], axis=1)
+    lengths = np.maximum(bones, bones[skeleton.parents])[joints]  # of two, as a misplaced joint shortens one
     seen = {
         name: row
         for name, row, length in zip(names, reach, lengths, strict=True)
