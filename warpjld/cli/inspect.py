@@ -78,7 +78,7 @@ def inspect_command(
 def _report(rig: Rig) -> dict[str, Any]:
     from warpjld.motion.animations import animation_names
     from warpjld.rig.centres import joint_centres
-    from warpjld.skeleton.recognise.placing import check_placing
+    from warpjld.skeleton.recognise.placing.check import check_placing
 
     skeleton, surface = rig.skeleton, rig.surface
     domains = _domains(rig)

@@ -12,6 +12,7 @@ from warpjld.errors import InputError
 from warpjld.geometry.lengths import check_reach, check_size
 from warpjld.geometry.spread import spread
 from warpjld.geometry.surface import Surface, weld_surface
+from warpjld.io.agreement import elsewhere, outside_out
 from warpjld.io.placement import place
 from warpjld.io.rigid_parts import rigid_parts
 from warpjld.io.source import SourceRig
@@ -69,7 +70,7 @@ def _assemble(
     file_tree = source.tree
     shares = flesh_shares(len(source.tree), source.joints, source.weights, source.rigid)
     roles = recognise(source.tree, shares, _stated(source, joint_map or {}), by_shape=not source.stated)
-    source = place(source, roles, unit=unit, scale=scale, up=up)
+    source = outside_out(place(source, roles, unit=unit, scale=scale, up=up))
     check_size(source.vertices[source.faces.ravel()], "the surface", "--unit or --scale")
     check_size(source.tree.positions, "the skeleton", "--unit or --scale", least=0.0)
     surface = weld_surface(
@@ -115,7 +116,7 @@ def _assemble(
         placing=source.placing,
         rigid=rigid,
         notes=(*source.notes, *_joined(surface), *found.notes, *bent, *_bare(bare, skin), *rigid_notes),
-        suspicious=(*source.suspicious, *found.suspicious),
+        suspicious=(*source.suspicious, *elsewhere(source), *found.suspicious),
     )
 
 

@@ -31,7 +31,7 @@ from warpjld.files.whole_file import whole_file
 from warpjld.io.mesh_file import MeshFile
 from warpjld.io.source import SourceRig
 from warpjld.skeleton.actor_points import ACTOR_PARENTS, ACTOR_POINTS, CANONICAL, point_set
-from warpjld.skeleton.recognise.placing import outside_surface
+from warpjld.skeleton.recognise.placing.inside import outside_surface
 from warpjld.skeleton.recognise.tree import SourceTree
 from warpjld.suggest import did_you_mean
 

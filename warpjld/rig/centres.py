@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpjld.geometry.rotations import unit
 from warpjld.rig import Rig
 from warpjld.skeleton.initial import bent_as_before
-from warpjld.skeleton.recognise.placing import in_trunk
+from warpjld.skeleton.recognise.placing.sections import in_trunk
 from warpjld.skeleton.recognise.section import cross_section, nearby
 from warpjld.skeleton.tree import Skeleton
 

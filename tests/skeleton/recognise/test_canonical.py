@@ -107,12 +107,13 @@ def test_a_mano_like_hand_is_completed():
     assert sum("no tip joints" in note or "no carpal ends" in note for note in found.notes) == 2
 
 
-def test_fingertips_outside_the_surface_are_brought_in():
+@pytest.mark.parametrize("beyond", [1.5, 0.3])
+def test_fingertips_outside_the_surface_or_at_the_skin_are_brought_in(beyond):
     source, vertices, faces = built("left")
     frames = source.frames.copy()
     tips = [j for j, n in enumerate(source.names) if n.endswith(".tip")]
     above = source.parents[tips]
-    frames[tips, :3, 3] += 1.5 * (frames[tips, :3, 3] - frames[above, :3, 3])
+    frames[tips, :3, 3] += beyond * (frames[tips, :3, 3] - frames[above, :3, 3])
     found = canonical_skeleton(SourceTree(source.names, source.parents, frames), vertices, faces)
     for j in tips:
         k = found.skeleton.names.index(source.names[j])

@@ -9,15 +9,16 @@ import pytest
 import pyvista as pv
 import trimesh
 
+from tests.benchmarks.placing import KINDS, misplaced, open_named
 from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
 from warpjld.skeleton import Skeleton, default_limits
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
-from warpjld.skeleton.recognise.knuckle_width import widest_at_knuckles
-from warpjld.skeleton.recognise.placing import check_placing
+from warpjld.skeleton.recognise.placing.check import check_placing
+from warpjld.skeleton.recognise.placing.knuckle_width import widest_at_knuckles
 
 
-def misplaced(rig, joint, offset):
+def findings_of(rig, joint, offset):
     skeleton = rig.skeleton
     rest = skeleton.rest.copy()
     rest[skeleton.names.index(joint)] += offset
@@ -25,7 +26,7 @@ def misplaced(rig, joint, offset):
 
 
 def check_named(rig, joint, offset, within):
-    findings = misplaced(rig, joint, offset)
+    findings = findings_of(rig, joint, offset)
     found = next((one for one in findings if one.joint == joint), None)
     assert found is not None, [one.message for one in findings]
     assert found.proposal is not None
@@ -116,7 +117,14 @@ def test_a_tube_has_no_widest_place():
 
 
 @pytest.mark.parametrize(
-    "name", ["body_anny/body_lowpoly_163joints.glb", "hand_webxr_generic/left.glb", "hand_webxr_generic/right.glb"]
+    "name",
+    [
+        "body_anny/body_lowpoly_163joints.glb",
+        "hand_webxr_generic/left.glb",
+        "hand_webxr_generic/right.glb",
+        "hand_godot_low/Hand_low_R.gltf",
+        "hand_godot_low/Hand_Nails_low_L.gltf",
+    ],
 )
 def test_rigs_of_others_as_shipped(data, name):
     rig = load_rig(data / name)
@@ -148,3 +156,31 @@ def test_a_body_of_many_pieces(data, joint, offset):
 def test_any_direction_in_a_body_of_others(data, joint, by, axis, sign):
     rig = load_rig(data / "body_anny/body_lowpoly_163joints.glb")
     check_named(rig, joint, sign * by * np.eye(3)[axis], 1.0)
+
+
+FLOORS = {
+    "godot_low": (1, 0.9),
+    "godot_low_right": (1, 0.9),
+    "godot_nails": (1, 0.9),
+    "anny_hand": (0, 0.9),
+    "anny_hand_right": (0, 0.9),
+    "webxr": (0, 0.9),
+    "webxr_right": (0, 0.9),
+    "builtin": (0, 0.9),
+    "anny_low": (0, 0.95),
+    "mannequin": (0, 0.9),
+}
+"""Rig → largest number of joints named as shipped, and smallest share of displacements that are named."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FLOORS)
+def test_the_benchmark_of_misplaced_joints(name):
+    rig = open_named(name)
+    if rig is None:
+        pytest.skip("no file here")
+    most, least = FLOORS[name]
+    assert len(check_placing(rig.skeleton, rig.surface.vertices, rig.surface.faces)) <= most
+    results = [misplaced(rig, kind, 10) for kind in KINDS]
+    named, tried = (sum(result[k] for result in results) for k in (0, 1))
+    assert named >= least * tried > 0, [line for result in results for line in result[3]]

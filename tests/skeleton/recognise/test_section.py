@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from warpjld.skeleton.recognise.extremity import find_extremity
-from warpjld.skeleton.recognise.section import cross_section, first_hits
+from warpjld.skeleton.recognise.section import cross_section, first_hits, skin_hits
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +26,19 @@ def test_first_hits_from_inside_a_box():
     np.testing.assert_allclose(hits, [0.75, 1.5, 2.0, 1.25, 2.5, 4.0])
     away = first_hits(np.array(mesh.vertices), np.array(mesh.faces), origins + 10, directions[:1])
     assert np.isinf(away[0])
+
+
+def test_flesh_of_overlapping_pieces_ends_where_the_last_ends():
+    """Two boxes: a ray from the one, or from both, goes on to the end of the other; from outside it meets the first."""
+    one = trimesh.creation.box((2.0, 2.0, 2.0))
+    other = trimesh.creation.box((2.0, 1.0, 1.0), transform=trimesh.transformations.translation_matrix([1.5, 0, 0]))
+    mesh = trimesh.util.concatenate([one, other])
+    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
+    origins = np.array([[0.0, 0.1, 0.2], [0.75, 0.0, 0.0], [-2.0, 0.1, 0.2], [0.0, 0.8, 0.0]])
+    way = np.tile([1.0, 0.0, 0.0], (4, 1))
+    np.testing.assert_allclose(skin_hits(vertices, faces, origins, way), [2.5, 1.75, 1.0, 1.0])
+    np.testing.assert_allclose(first_hits(vertices, faces, origins, way), [0.5, 0.25, 1.0, 1.0])
+    assert np.isinf(skin_hits(vertices, faces, origins[2:3], -way[:1])).all()
 
 
 def test_a_section_finds_the_centre_from_an_eccentric_point(capsule):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tests.skeleton.recognise.test_digits import DIGITS, hand
-from warpjld.skeleton.recognise.canonical import canonical_skeleton
+from warpjld.skeleton.recognise.by_name import roles_by_name
+from warpjld.skeleton.recognise.canonical import Canonical, canonical_skeleton
 from warpjld.skeleton.recognise.recognise import recognise
 from warpjld.skeleton.recognise.tree import SourceTree
 
@@ -113,10 +114,14 @@ def with_chain(tree: SourceTree, parent: str, places: list[np.ndarray]) -> Sourc
 
 
 def kept(tree: SourceTree) -> set[str]:
+    return set(in_a_box(tree).skeleton.names)
+
+
+def in_a_box(tree: SourceTree) -> Canonical:
     box = np.array([[x, y, z] for x in (-2.0, 2.0) for y in (-2.0, 2.0) for z in (-2.0, 2.0)])
     faces = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6]])
     faces = np.concatenate([faces, [[0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]]).astype(np.int32)
-    return set(canonical_skeleton(tree, box, faces, shares=even(tree)).skeleton.names)
+    return canonical_skeleton(tree, box, faces, shares=even(tree))
 
 
 def test_a_sixth_finger_keeps_its_joints() -> None:
@@ -127,6 +132,63 @@ def test_a_sixth_finger_keeps_its_joints() -> None:
     assert {"more0", "more1", "more2", "more3"} <= names
     assert sum(name.startswith(("left.", "right.")) for name in names) == 25
     assert len(DIGITS) == 5
+
+
+def test_a_sixth_finger_on_a_metacarpal_keeps_its_joints() -> None:
+    one = hand("metacarpals", [1.0] * 40, "numbers")
+    pinky = [one.tree.positions[one.want[f"pinky.{j}"]] for j in ("base", "knuckle2", "knuckle3")]
+    above = one.tree.names[one.want["pinky.carpometacarpal"]]
+    assert {"more0", "more1", "more2"} <= kept(with_chain(one.tree, above, [np.add(p, (0.025, 0, 0)) for p in pinky]))
+
+
+def test_a_jaw_without_skin_is_not_the_top_of_the_head() -> None:
+    """What ends a bone without skin is the head's top only where it lies far enough above the head."""
+    for place, is_top in (((0.0, 1.56, 0.05), False), ((0.0, 1.72, 0.03), True)):
+        tree = body(more=("neck_joint_2", place))
+        shares = even(tree)
+        shares[tree.names.index("more")] = 0.0
+        assert (recognise(tree, shares).body.get("head.top") == tree.names.index("more")) is is_top
+
+
+def test_toes_and_spine_of_a_body_without_a_hierarchy() -> None:
+    """Joints of one toe share its number; a spine's numbers may count downwards."""
+    joints = {"root": (None, (0.0, 0.95, 0.0))}
+    joints |= {f"spine0{n}": ("root", (0.0, 1.5 - 0.1 * n, 0.0)) for n in (1, 2, 3)}
+    for s, x in (("L", 1.0), ("R", -1.0)):
+        leg = {"upperleg": (0.1, 0.9, 0.0), "lowerleg": (0.1, 0.5, 0.0), "foot": (0.1, 0.08, 0.0)}
+        leg |= {f"toe{n}-{k}": (0.06 + 0.02 * n, 0.02, 0.1 + 0.03 * k) for k in (2, 1) for n in (1, 2, 3)}
+        joints |= {f"{name}.{s}": ("root", (x * a, b, c)) for name, (a, b, c) in leg.items()}
+    flat = made({name: (None, place) for name, (_, place) in joints.items()})
+    found = {name: flat.names[j] for name, j in roles_by_name(flat).body.items()}
+    assert {n: found.get(f"left.toe{n}.base") for n in (1, 2, 3, 4)} == {n: f"toe{n}-1.L" for n in (1, 2, 3)} | {
+        4: None
+    }
+    assert found["left.toe2.knuckle2"] == "toe2-2.L"
+    assert [found[f"spine{n}"] for n in (1, 2, 3)] == ["spine03", "spine02", "spine01"]
+
+
+def test_two_actors_in_a_file_are_told() -> None:
+    one = hand("tips", [1.0] * 40, "ends").tree
+    frames = one.frames.copy()
+    frames[:, 0, 3] += 0.5
+    both = SourceTree(
+        tuple(f"{actor}_left_{name}" for actor in "AB" for name in one.names),
+        np.concatenate([one.parents, np.where(one.parents < 0, -1, one.parents + len(one))]),
+        np.concatenate([one.frames, frames]),
+    )
+    found = in_a_box(both)
+    assert any("several actors in one file: that of 'A_left_wrist'" in doubt for doubt in found.suspicious)
+    hand_of = {
+        both.names[j][0]
+        for name, j in zip(found.skeleton.names, found.sources, strict=True)
+        if name[:5] == "left." and j >= 0
+    }
+    assert hand_of == {"A"}
+    # but a left and a right hand, or hands whose names tell no side, are one actor's
+    one_actor = SourceTree(
+        tuple(n.replace("B_left", "A_right").replace("left_", "") for n in both.names), both.parents, both.frames
+    )
+    assert not any("several actors" in doubt for doubt in recognise(one_actor, even(both)).suspicious)
 
 
 def test_hair_keeps_its_joints_and_a_jaw_does_not() -> None:

@@ -10,7 +10,7 @@ from warpjld.skeleton.place.body import place_body
 from warpjld.skeleton.place.hand import place_hand
 from warpjld.skeleton.place.solid import VoxelSolid, solid_of
 from warpjld.skeleton.recognise.hand_frame import chirality
-from warpjld.skeleton.recognise.placing import outside_surface
+from warpjld.skeleton.recognise.placing.inside import outside_surface
 
 __all__ = ["propose_points"]
 

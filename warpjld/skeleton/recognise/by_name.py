@@ -60,7 +60,7 @@ def roles_by_name(tree: SourceTree, flesh: JointFlesh | None = None) -> Roles:
                 roles.body[f"{side}.hand.tip"] = kinds[side, "hand end"][0]
             _toes(tree, kinds, side, roles, flesh)
     roles.hands = assign_hands(tree, hands, flesh)
-    _trunk(kinds, roles, flesh)
+    _trunk(tree, kinds, roles, flesh)
     return roles
 
 
@@ -128,16 +128,32 @@ def _toes(
         if rest:
             roles.body[f"{side}.toe.tip"] = rest[-1]
         return
-    for n, head in enumerate(heads, start=1):
-        rest = [j for j in tree.subtree(head) if not flesh.dead[j] and not flesh.passing[j]]
+    chains = [[j for j in tree.subtree(head) if not flesh.dead[j] and not flesh.passing[j]] for head in heads]
+    for n, rest in enumerate(_numbered_chains(tree, side, toes, roles) if tree.flat else chains, start=1):
         for name, joint in zip(FINGER_JOINTS, rest, strict=False):
             roles.body[f"{side}.toe{n}.{'tip' if read_name(tree.names[joint]).rank == 4 else name}"] = joint
 
 
-def _trunk(kinds: dict[tuple[str | None, str], list[int]], roles: Roles, flesh: JointFlesh) -> None:
+def _numbered_chains(tree: SourceTree, side: str, toes: list[int], roles: Roles) -> list[list[int]]:
+    """Toes of a file without a hierarchy: joints of one number, from the ankle outwards."""
+    if not toes:
+        return []
+    ankle = roles.body.get(f"{side}.ankle")
+    start = tree.positions[toes].mean(axis=0) if ankle is None else tree.positions[ankle]
+    chains: dict[int, list[int]] = {}
+    for j in sorted(toes, key=lambda j: float(np.linalg.norm(tree.positions[j] - start))):
+        chains.setdefault(read_name(tree.names[j]).number or 0, []).append(j)
+    return [chains[number] for number in sorted(chains)]
+
+
+def _trunk(tree: SourceTree, kinds: dict[tuple[str | None, str], list[int]], roles: Roles, flesh: JointFlesh) -> None:
     if not (kinds[None, "spine"] or kinds[None, "pelvis"] or kinds[None, "head"]):
         return
     for name in ("spine", "neck"):
+        hips = [roles.body[f"{side}.hip"] for side in ("left", "right") if f"{side}.hip" in roles.body]
+        if tree.flat and hips:  # numbers may count downwards
+            start = tree.positions[hips].mean(axis=0)
+            kinds[None, name].sort(key=lambda j: float(np.linalg.norm(tree.positions[j] - start)))
         fleshy = [j for j in kinds[None, name] if not flesh.bare[j]]
         for n, joint in enumerate(fleshy or kinds[None, name], start=1):
             roles.body[f"{name}{n}"] = joint

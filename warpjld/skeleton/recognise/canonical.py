@@ -93,6 +93,10 @@ def canonical_skeleton(
     for hand in roles.hands:
         found = {name: tree.positions[j] for name, j in hand.joints.items()}
         hand.side = _side(hand, found, side if len(roles.hands) == 1 else None, doubts)
+        if hand.side in hand_points:
+            doubts.append(
+                f"several {hand.side} hands, as of two actors: one is recognised; give each a file of its own"
+            )
         points: dict[str, NDArray[np.float64]] = dict(found)
         added: list[str] = []
         if not placed:

@@ -11,7 +11,7 @@ from warpjld.geometry.rotations import unit
 from warpjld.geometry.winding import winding_numbers
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
 from warpjld.skeleton.recognise.extremity import find_extremity
-from warpjld.skeleton.recognise.section import nearby
+from warpjld.skeleton.recognise.section import nearby, skin_hits
 
 __all__ = ["complete_hand"]
 
@@ -52,14 +52,15 @@ def complete_hand(
     for digit in (*fingers, *(("thumb",) if "thumb.base" in points else ())):
         tip = f"{digit}.tip"
         had = points.get(tip)
-        if had is None or winding_numbers(vertices, faces, had[None])[0] < 0.5:
-            points[tip] = _tip(points, digit, directions, vertices, faces)
+        centre = _tip(points, digit, directions, vertices, faces)
+        if had is None or _at_skin(had, centre, vertices, faces):
+            points[tip] = centre
             (derived if had is None else moved).append(digit)
         _missing_knuckles(points, digit, notes, label)
     if derived:
         notes.append(f"{label}: no tip joints for {', '.join(derived)}: placed in the centre of the fingertip")
     if moved:
-        notes.append(f"{label}: tips of {', '.join(moved)} lie outside the surface: moved to the fingertip's centre")
+        notes.append(f"{label}: {', '.join(moved)}: tips at or outside the surface, moved to the fingertip's centre")
     return points, notes
 
 
@@ -127,6 +128,18 @@ def _tip(
         direction = unit(had - points[last])
     found = find_extremity(vertices, faces, points[last], direction, length)
     return points[last] + 0.7 * length * direction if found is None else found
+
+
+def _at_skin(
+    had: NDArray[np.float64], centre: NDArray[np.float64], vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> bool:
+    """Whether a tip is outside, or nearer to the end of its finger than to the fingertip's centre, so that it marks the
+    end."""
+    if winding_numbers(vertices, faces, had[None])[0] < 0.5:
+        return True
+    away = had - centre
+    beyond = float(np.linalg.norm(away))
+    return beyond > 0.0 and float(skin_hits(vertices, faces, had[None], away[None] / beyond)[0]) < beyond
 
 
 def _missing_knuckles(points: dict[str, NDArray[np.float64]], digit: str, notes: list[str], label: str) -> None:

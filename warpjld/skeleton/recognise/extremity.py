@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.skeleton.recognise.section import cross_section, first_hits
+from warpjld.skeleton.recognise.section import cross_section, skin_hits
 
 __all__ = ["find_extremity"]
 
@@ -33,7 +33,7 @@ def find_extremity(
         The point, or None where the line does not leave the surface within reach.
     """
     # if the line misses, take the furthest vertex near it: the last joint may be off-centre or its bone skewed
-    length = first_hits(vertices, faces, start[None], direction[None])[0]
+    length = skin_hits(vertices, faces, start[None], direction[None])[0]
     if not np.isfinite(length) or length > 3.0 * expected:
         near = vertices - start
         along = near @ direction

@@ -26,7 +26,7 @@ def fill_body(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collect
     _fill_spine(tree, roles, stated)
     _fill_head(tree, roles, flesh, stated)
     _fill_feet(tree, roles, flesh, stated)
-    _fill_ends(roles, flesh, stated)
+    _fill_ends(tree, roles, flesh, stated)
 
 
 def _fill_pelvis(tree: SourceTree, roles: Roles, stated: Collection[str]) -> None:
@@ -119,7 +119,7 @@ def _fill_feet(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collec
             roles.notes.append(f"{side} toes: {len(below)} chains below the ankle, the innermost is the big one")
 
 
-def _fill_ends(roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
+def _fill_ends(tree: SourceTree, roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None:
     """Set the tips of toes, head and arms without hands to joints without skin beyond them."""
     taken = set(roles.body.values())
     for end, last in flesh.ends.items():
@@ -127,6 +127,16 @@ def _fill_ends(roles: Roles, flesh: JointFlesh, stated: Collection[str]) -> None
         if name is None or end in taken:
             continue
         side, _, part = name.rpartition(".")
+        if part == "head" and not _continues(tree, roles.body.get("neck1", int(tree.parents[last])), last, end):
+            continue  # a jaw or a brow
         tip = {"head": "head.top", "ball": f"{side}.toe.tip", "wrist": f"{side}.hand.tip"}.get(part)
         if tip and tip not in roles.body and tip not in stated:
             roles.body[tip] = end
+
+
+def _continues(tree: SourceTree, above: int, last: int, end: int) -> bool:
+    """Whether an end lies at least a third as far beyond a joint as that joint beyond one above it."""
+    if above < 0:
+        return True
+    bone, beyond = tree.positions[last] - tree.positions[above], tree.positions[end] - tree.positions[last]
+    return float(bone @ beyond) >= float(bone @ bone) / 3.0

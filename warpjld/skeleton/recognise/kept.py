@@ -97,7 +97,7 @@ def _bends_limb(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFles
 
 
 def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: JointFlesh, joint: int) -> bool:
-    """Whether a joint belongs to a chain with skin that leaves the wrist beside the known digits (a sixth finger), or
+    """Whether a joint belongs to a chain with skin that leaves the palm beside the known digits (a sixth finger), or
     hangs far down from the head (hair)."""
     if tree.flat or not flesh.known or flesh.dead[joint]:
         return False
@@ -105,7 +105,7 @@ def _chain_of_its_own(tree: SourceTree, of_source: Mapping[int, str], flesh: Joi
     while (above := int(tree.parents[line[-1]])) >= 0 and above not in of_source:
         line.append(above)
     word = of_source[above].rpartition(".")[2] if above >= 0 else ""
-    if word not in ("wrist", "head"):
+    if word not in ("wrist", "carpometacarpal", "head"):
         return False
     chain = [j for j in tree.subtree(line[-1]) if not flesh.dead[j]]
     fleshy = [j for j in chain if not flesh.bare[j]]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.skeleton.recognise.actors import first_actor, in_whole_tree, only_joints
 from warpjld.skeleton.recognise.by_name import roles_by_name
 from warpjld.skeleton.recognise.by_shape import roles_by_shape
 from warpjld.skeleton.recognise.check_hands import check_hands
@@ -47,6 +48,10 @@ def recognise(
     Raises:
         InputError: ``stated`` names joints that the file does not have.
     """
+    joints = None if stated else first_actor(tree)
+    if joints is not None:
+        own = recognise(only_joints(tree, joints), None if shares is None else shares[joints], by_shape=by_shape)
+        return in_whole_tree(own, joints, tree)
     flesh = JointFlesh(tree, shares)
     by_hand = JointMap(tree, stated or {})
     roles = roles_by_name(tree, flesh)

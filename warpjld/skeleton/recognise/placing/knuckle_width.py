@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
-from warpjld.skeleton.recognise.section import first_hits, nearby
+from warpjld.skeleton.recognise.section import nearby, skin_hits
 from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["widest_at_knuckles"]
@@ -68,7 +68,7 @@ def _widest(chain: Array, axis: Array, vertices: Array, faces: NDArray[np.int32]
     places = chain[bone] + (at - ends[bone])[:, None] * ways[bone]
     across = np.array([unit(axis - (axis @ way) * way) for way in ways])[bone]
     rays = np.concatenate([across, -across])
-    width = first_hits(vertices, faces, np.concatenate([places, places]), rays).reshape(2, -1).sum(axis=0)
+    width = skin_hits(vertices, faces, np.concatenate([places, places]), rays).reshape(2, -1).sum(axis=0)
     if not np.isfinite(width).all():
         return None
     padded = np.pad(width, _SMOOTH // 2, mode="edge")

@@ -8,13 +8,14 @@ Tolerances are the largest deviations found in existing rigs.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
 from warpjld.skeleton.hand import FINGER_JOINTS
-from warpjld.skeleton.recognise.expected import Expectation
+from warpjld.skeleton.recognise.placing.expected import Expectation
 
 __all__ = ["finger_expectations"]
 
@@ -34,14 +35,17 @@ _THUMB = (0.51, 0.65)  # usual place of second and third joint between their nei
 _THUMB_ALONG = 0.08  # tolerance for them, per length of both bones
 
 
-def finger_expectations(joints: Joints, widest: Mapping[str, float]) -> list[Expectation]:
+def finger_expectations(
+    joints: Joints, widest: Mapping[str, float], aside: Mapping[str, float] = MappingProxyType({})
+) -> list[Expectation]:
     """Joints of digits whose relative position differs from that of the other digits, and from the surface.
 
     Args:
         joints: Canonical joints → positions [m].
         widest: Middle joints → distance to the finger's widest section [m], as of ``widest_at_knuckles``.
+        aside: Deviations across the bone in units of their tolerance, which leave less for one along the bone.
     """
-    out = []
+    out: list[Expectation] = []
     for side in ("left.", "right.", ""):
         chains = {
             digit: [joints[f"{side}{digit}.{joint}"] for joint in FINGER_JOINTS]
@@ -54,29 +58,44 @@ def finger_expectations(joints: Joints, widest: Mapping[str, float]) -> list[Exp
         palms = {digit: float(np.linalg.norm(chain[0] - wrist)) for digit, chain in chains.items()}
         relative = {digit: palms[digit] / _TO_BASE[digit] for digit in chains}
         palm = float(np.median(list(relative.values()))) * _TO_BASE["middle"]
-        wrong = set()
-        for digit, chain in chains.items():
-            others = np.median([relative[d] for d in chains if d != digit])
-            off = float((relative[digit] - others) * _TO_BASE[digit])
-            if abs(off) > _ALONG * palm:
-                finger = unit(chain[1] - chain[0])
-                wrong.add(digit)
-                out.append(
-                    Expectation(
-                        f"{side}{digit}.base",
-                        "proportion",
-                        chain[0] - off * finger,
-                        abs(off),
-                        f"{1e3 * palms[digit]:.0f} mm from the wrist, beside the other fingers "
-                        f"{1e3 * (palms[digit] - off):.0f} are expected",
-                    )
-                )
-        out += _thumb(side, joints)
-        out += _knuckles(side, {d: c for d, c in chains.items() if d not in wrong}, palm, widest)
+        bases = _bases(side, chains, palms, palm)
+        # several together: the wrist is elsewhere or the hand has other proportions, which says nothing of the bases
+        bases = bases if len(bases) == 1 else {}
+        wrong = set(bases)
+        out += bases.values()
+        out += _thumb(side, joints, aside)
+        out += _knuckles(side, {d: c for d, c in chains.items() if d not in wrong}, palm, widest, aside)
     return out
 
 
-def _thumb(side: str, joints: Joints) -> list[Expectation]:
+def _bases(
+    side: str, chains: Mapping[str, list[Array]], palms: Mapping[str, float], palm: float
+) -> dict[str, Expectation]:
+    """Fingers whose base is at another distance from the wrist than the others', in proportion."""
+    out = {}
+    relative = {digit: palms[digit] / _TO_BASE[digit] for digit in chains}
+    for digit, chain in chains.items():
+        others = np.median([relative[d] for d in chains if d != digit])
+        off = float((relative[digit] - others) * _TO_BASE[digit])
+        if abs(off) > _ALONG * palm:
+            out[digit] = Expectation(
+                f"{side}{digit}.base",
+                "proportion",
+                chain[0] - off * unit(chain[1] - chain[0]),
+                abs(off),
+                f"{1e3 * palms[digit]:.0f} mm from the wrist, beside the other fingers "
+                f"{1e3 * (palms[digit] - off):.0f} are expected",
+                abs(off) / (_ALONG * palm),
+            )
+    return out
+
+
+def _tolerated(aside: Mapping[str, float], name: str) -> float:
+    """Share of the tolerance along the bone that a deviation across it leaves."""
+    return float(np.sqrt(1.0 - min(aside.get(name, 0.0), 1.0) ** 2))
+
+
+def _thumb(side: str, joints: Joints, aside: Mapping[str, float]) -> list[Expectation]:
     """The joint of a thumb whose displacement explains most; a thumb has no comparable neighbour."""
     names = [f"{side}thumb.{joint}" for joint in FINGER_JOINTS]
     if not all(name in joints for name in names):
@@ -85,7 +104,7 @@ def _thumb(side: str, joints: Joints) -> list[Expectation]:
     off, most = _thumb_deviations(chain)
     tried = []
     for k in (1, 2):
-        if abs(off[k - 1]) > most[k - 1]:
+        if abs(off[k - 1]) > most[k - 1] * _tolerated(aside, names[k]):
             moved = chain.copy()
             moved[k] += abs(off[k - 1]) * unit(chain[k - 1] - chain[k] if off[k - 1] > 0 else chain[k + 1] - chain[k])
             left, _ = _thumb_deviations(moved)
@@ -95,7 +114,8 @@ def _thumb(side: str, joints: Joints) -> list[Expectation]:
     _, k, place = min(tried, key=lambda one: one[:2])
     first, second = (1e3 * float(length) for length in _bones(chain)[k - 1 : k + 1])
     detail = f"{first:.1f} mm before it, {second:.1f} behind"
-    return [Expectation(names[k], "proportion", place, abs(float(off[k - 1])), detail)]
+    by = abs(float(off[k - 1]))
+    return [Expectation(names[k], "proportion", place, by, detail, by / float(most[k - 1]))]
 
 
 def _thumb_deviations(chain: Array) -> tuple[Array, Array]:
@@ -110,7 +130,11 @@ def _bones(chain: Array) -> Array:
 
 
 def _knuckles(
-    side: str, chains: Mapping[str, list[Array]], palm: float, widest: Mapping[str, float]
+    side: str,
+    chains: Mapping[str, list[Array]],
+    palm: float,
+    widest: Mapping[str, float],
+    aside: Mapping[str, float],
 ) -> list[Expectation]:
     if len(chains) < 3:
         return []
@@ -126,18 +150,21 @@ def _knuckles(
         off = (shares[digit] - others) * lengths[digit]
         if (seen := widest.get(f"{side}{digit}.{FINGER_JOINTS[1]}")) is not None:
             off[0] = 0.5 * (off[0] - seen)
-        k = int(np.abs(off).argmax())
-        if abs(off[k]) <= _ALONG * palm:
+        names = [f"{side}{digit}.{joint}" for joint in FINGER_JOINTS[1:3]]
+        excess = np.abs(off) / (_ALONG * palm)
+        k = int(np.argmax(excess / [max(_tolerated(aside, name), 1e-9) for name in names]))
+        if excess[k] <= _tolerated(aside, names[k]):
             continue
         before, at, after = chain[k], chain[k + 1], chain[k + 2]
         way = unit(before - at) if off[k] > 0 else unit(after - at)
         found.append(
             Expectation(
-                f"{side}{digit}.{FINGER_JOINTS[k + 1]}",
+                names[k],
                 "proportion",
                 at + abs(float(off[k])) * way,
                 abs(float(off[k])),
                 f"{abs(1e3 * float(off[k])):.1f} mm too far {'out' if off[k] > 0 else 'in'} beside the other fingers",
+                float(excess[k]),
             )
         )
     return found

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
+from warpjld.skeleton.recognise.placing.symmetry import FEWEST_PAIRS, left_and_right, sagittal_plane
 
 __all__ = ["Expectation", "body_expectations"]
 
@@ -26,7 +27,6 @@ _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 _HALVES = 1.32  # largest ratio of a limb's halves: 1.02 to 1.13 are usual, knees a tenth of the leg off give 1.4
 _ASIDE = 0.012  # tolerance from the midline, or from the mirror image, per height of the body
 _HAND_ASIDE = 0.0035  # likewise in hands and feet, whose joints are closer together
-_ALIKE = 0.004  # largest median asymmetry of a symmetric rest pose, per height of the body
 _SCALE = 0.5
 """Oddity of a hip or shoulder as far from its usual place as is tolerated: that of a place with thrice the flesh on one
 side (0.5), so that neither measure outweighs the other. Flesh of many pieces, of which rays meet inner ones, says
@@ -48,6 +48,7 @@ class Expectation:
         place: Expected position [m], shape (3,).
         amount: Distance from it [m].
         detail: Description of the deviation for the user.
+        excess: Distance in units of its tolerance.
     """
 
     joint: str
@@ -55,10 +56,11 @@ class Expectation:
     place: Array
     amount: float
     detail: str
+    excess: float = 1.0
 
 
 def body_expectations(
-    joints: Joints, up: Array, height: float, floor: float, uneven: Callable[[Array], float]
+    joints: Joints, up: Array, height: float, floor: float, uneven: Callable[[str, Array], float]
 ) -> list[Expectation]:
     """Joints of trunk and limbs that deviate from proportions, the midline or the other side.
 
@@ -67,12 +69,12 @@ def body_expectations(
         up: The body's up direction, unit vector.
         height: Height of its surface along ``up`` [m].
         floor: Lowest coordinate of its surface along ``up`` [m].
-        uneven: Asymmetry of the flesh around a place, from 0 to 1.
+        uneven: Asymmetry of the flesh around a joint's place, from 0 to 1, and the share of its segments outside.
     """
-    pairs = {name[5:]: (place, joints[f"right.{name[5:]}"]) for name, place in joints.items() if _paired(name, joints)}
-    if len(pairs) < 4:
+    pairs = left_and_right(joints)
+    if len(pairs) < FEWEST_PAIRS:
         return []
-    left, middle, alike = _sagittal_plane(pairs, height)
+    left, middle, alike = sagittal_plane(pairs, height)
     out = _limbs(joints)
     out += _spine(joints, up, height, left, middle)
     named = {expectation.joint for expectation in out}
@@ -85,7 +87,7 @@ def body_expectations(
         if off <= (_HAND_ASIDE if fine else _ASIDE) * height or {f"left.{name}", f"right.{name}"} & named:
             continue
         odd = {
-            side: uneven(place) + _oddity(name, place, joints, side, left, middle, up, height, floor)
+            side: uneven(f"{side}.{name}", place) + _oddity(name, place, joints, side, left, middle, up, height, floor)
             for side, place in (("left", a), ("right", b))
         }
         ratio = odd["left"] / max(odd["right"], 1e-9)
@@ -97,24 +99,6 @@ def body_expectations(
             beside += "; either may be wrong" if len(doubted) > 1 else ""
             out.append(Expectation(f"{side}.{name}", "asymmetric", place, off, beside))
     return out
-
-
-def _paired(name: str, joints: Joints) -> bool:
-    return name.startswith("left.") and f"right.{name[5:]}" in joints
-
-
-def _sagittal_plane(pairs: Mapping[str, tuple[Array, Array]], height: float) -> tuple[Array, Array, bool]:
-    """Normal of the sagittal plane (unit, to the left), a point of it, and whether the sides are mirror images."""
-    a = np.array([pair[0] for pair in pairs.values()])
-    b = np.array([pair[1] for pair in pairs.values()])
-    good = np.ones(len(a), dtype=bool)
-    for _ in range(3):
-        left = unit((a - b)[good].sum(axis=0))
-        middle = np.median(((a + b) / 2)[good], axis=0)
-        mirrored = b - 2.0 * ((b - middle) @ left)[:, None] * left
-        off = np.linalg.norm(a - mirrored, axis=1)
-        good = off <= max(float(np.median(off)), _ALIKE * height)
-    return left, middle, bool(np.median(off) < _ALIKE * height)
 
 
 def _oddity(
@@ -179,6 +163,7 @@ def _limbs(joints: Joints) -> list[Expectation]:
                     place,
                     off,
                     f"{parts[0]} {1e3 * upper:.0f} mm, {parts[1]} {1e3 * lower:.0f}",
+                    float(abs(np.log(upper / lower)) / np.log(_HALVES)),
                 )
             )
     return out

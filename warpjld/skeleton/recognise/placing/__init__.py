@@ -1,0 +1,1 @@
+"""Detection of misplaced joints (R14), which cause bad deformation."""
