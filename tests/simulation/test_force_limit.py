@@ -76,9 +76,9 @@ def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_p
 def test_what_has_stopped_is_kept_for_a_run_that_goes_on() -> None:
     load = DigitLoad("LEFT", "left.index", 12.0, 0.2, 2.9e5, 0.5, "CAN")
     content = {
-        "caps": [["LEFT", "left.index", 2.0, 3.0, [[7, [0.3, 0.31]], [8, [0.5, 0.5]]]]],
+        "caps": [["LEFT", "left.index", 0, 2.0, 3.0, [[7, [0.3, 0.31]], [8, [0.5, 0.5]]]]],
         "loads": [asdict(load)],
-        "stuck": [["LEFT", "left.index"]],
+        "stuck": [["LEFT", "left.index", -1]],
         "stops": [asdict(Stop("LEFT", "left.index", 26.5, "its muscles can do no more"))],
     }
     limits = ForceLimits({}, 3e5, {}, None)  # type: ignore[arg-type]
