@@ -13,7 +13,7 @@ import numpy as np
 
 from warpjld.fem.hand.bone_loads import BoneLoads
 from warpjld.fem.hand.limits import force_limits
-from warpjld.fem.hand.muscles import digit_chains
+from warpjld.fem.hand.muscles import knuckle_chains
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 
@@ -45,7 +45,7 @@ def sideways_shares(
     from scipy.spatial.transform import Rotation
 
     allowed, out = force_limits(limits), {}
-    for digit, (joints, tip) in digit_chains(skeleton).items():
+    for digit, (joints, tip) in knuckle_chains(skeleton).items():
         name, joint = digit.rpartition(".")[2], joints[0]
         beyond = np.isin(loads.bones, [*joints[1:], tip])
         force, moment = loads.force[beyond].sum(axis=0), loads.moment[beyond].sum(axis=0)

@@ -16,7 +16,7 @@ from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints
 from warpjld.simulation.fall.rigid_body import RigidBody
 
-__all__ = ["NearPoints", "RigidContact", "contacts_with", "contacts_within"]
+__all__ = ["ContactCandidates", "RigidContact", "contacts_with", "contacts_within"]
 
 _ALIKE = np.cos(np.radians(10.0))
 """Cosine of the angle below which normals belong to the same contact plane."""
@@ -64,7 +64,7 @@ class RigidContact:
 
 
 @dataclass(frozen=True, eq=False)
-class NearPoints:
+class ContactCandidates:
     """All possible contact points of a body with another or with an obstacle; values as in ``RigidContact``, by row.
 
     Attributes:
@@ -114,7 +114,7 @@ def contacts_with(
     margin: float,
     friction: Callable[[str, str], float],
     shapes: Mapping[str, NDArray[np.float64]],
-) -> list[NearPoints]:
+) -> list[ContactCandidates]:
     """Contact points of a body, or a part of it, with obstacles that are closer than a margin.
 
     Args:
@@ -144,7 +144,7 @@ def contacts_with(
 
 def contacts_within(
     bodies: Sequence[RigidBody], margin: float, friction: Callable[[str, str], float]
-) -> list[NearPoints]:
+) -> list[ContactCandidates]:
     """Contact points between bodies that are closer than a margin [m]."""
     out = []
     parts = [(k, part) for k, body in enumerate(bodies) for part in body.parts]
@@ -206,9 +206,9 @@ def _joined(sets: Sequence[_Near]) -> _Near:
 
 def _near_points(
     body: int, other: int, near: _Near, carried: NDArray[np.float64], friction: float, own: str, name: str
-) -> NearPoints:
+) -> ContactCandidates:
     values = near.points, near.normals, near.gaps, carried
-    return NearPoints(body, other, *values, friction, own, name, _outermost(near))
+    return ContactCandidates(body, other, *values, friction, own, name, _outermost(near))
 
 
 def _outermost(near: _Near) -> list[int]:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.obstacle import Rigid
-from warpjld.simulation.fall.contact_points import NearPoints, RigidContact, contacts_with, contacts_within
+from warpjld.simulation.fall.contact_points import ContactCandidates, RigidContact, contacts_with, contacts_within
 from warpjld.simulation.fall.impulses import impulses, jacobian
 from warpjld.simulation.fall.rigid_body import RigidBody
 
@@ -115,7 +115,7 @@ def _shape(obstacle: Obstacle, time: float) -> NDArray[np.float64]:
 
 
 def _impelled(
-    bodies: Sequence[RigidBody], near: Sequence[NearPoints], length: float
+    bodies: Sequence[RigidBody], near: Sequence[ContactCandidates], length: float
 ) -> tuple[list[RigidContact], NDArray[np.float64]]:
     """Apply contact impulses to the velocities of bodies.
 
@@ -160,7 +160,7 @@ def _inverses(bodies: Sequence[RigidBody]) -> NDArray[np.float64]:
 
 
 def _added(
-    bodies: Sequence[RigidBody], near: Sequence[NearPoints], rows: Sequence[list[int]], length: float
+    bodies: Sequence[RigidBody], near: Sequence[ContactCandidates], rows: Sequence[list[int]], length: float
 ) -> bool:
     """Add to ``rows`` of each pair the point that would overlap most at the end of the step; False if none would."""
     out = False

@@ -50,8 +50,8 @@ class ContactRow:
             limit; NaN for the palm.
         sliding: Share of the contact area that slides; NaN without contact.
         state: ``free``, ``sticking``, ``sliding``, or ``partly sliding``.
-        short_deg: Largest lag of a joint's flexion or abduction in this digit behind the requested animation [degrees]; 0 without a
-            lag, and for the palm.
+        short_deg: Largest lag of a joint's flexion or abduction in this digit behind the requested animation [degrees];
+            0 without a lag, and for the palm.
     """
 
     frame: float
