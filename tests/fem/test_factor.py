@@ -8,7 +8,7 @@ import pytest
 from warpjld.fem import Body, HexMesh, LinearElastic, box_hexes, merge
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.solver.elimination import eliminate
-from warpjld.fem.solver.factor import Factor
+from warpjld.fem.solver.factor import CostlyError, Factor
 
 
 def _stiffness(mesh: HexMesh) -> tuple[BlockMatrix, np.ndarray]:
@@ -90,6 +90,14 @@ def test_what_is_not_positive_definite_is_named() -> None:
         Factor(BlockMatrix(matrix.rows, matrix.columns, shifted), loose, threads=1)
     assert np.linalg.eigvalsh(_dense(BlockMatrix(matrix.rows, matrix.columns, shifted), loose)).min() < 0.0
     Factor(matrix, free, threads=1)
+
+
+def test_a_factor_that_costs_more_than_allowed_is_refused_before_it_is_made() -> None:
+    matrix, free = _stiffness(box_hexes((1.0, 0.5, 0.5), (4, 3, 3)))
+    work = Factor(matrix, free, threads=1).elimination.work
+    with pytest.raises(CostlyError, match="multiplications"):
+        Factor(matrix, free, threads=1, most=0.99 * work)
+    assert Factor(matrix, free, threads=1, most=work).elimination.work == work
 
 
 def test_orders_are_complete_and_fill_is_low() -> None:

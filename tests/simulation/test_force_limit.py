@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -10,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.script import Scene
+from warpjld.hand.kept import kept_hand
+from warpjld.io import load_rig
+from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import run_contact
 from warpjld.script.runner import run_scene
 from warpjld.simulation.solve.digit_loads import DigitLoad
@@ -55,6 +58,40 @@ def test_muscles_end_it_where_they_are_weaker(run: Callable[[str], Scene], tmp_p
     assert stop.endswith("its muscles can do no more")
 
 
+BESIDE = """
+FRAMES 0 10
+FINGER1 LEFT INDEX ABDUCTION AT 0 0
+FINGER1 LEFT INDEX ABDUCTION AT 10 -16
+FINGER1 LEFT MIDDLE ABDUCTION AT 0 0
+FINGER1 LEFT MIDDLE ABDUCTION AT 10 8
+FRICTION LEFT LEFT 0
+FLESH LEFT INDEX MIDDLE ELEMENT {0} ITSELF ON
+PRESS 0 10 EVERY 2
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hand", "element"), [("builtin", 0.005), ("hand_webxr_generic", 0.004)])
+def test_fingers_that_squeeze_each_other_stop_where_their_interossei_do(
+    hand: str, element: float, data: Path, tmp_path: Path
+) -> None:
+    rig = kept_hand("left") if hand == "builtin" else load_rig(data / hand / "left.glb")
+    scene = Scene(say=lambda text: None)
+    scene.add("left", rig)
+    Interpreter(scene).run_text(BESIDE.format(element))
+    found = run_contact(scene, tmp_path)
+    assert found.verdict.status == "CONVERGED"
+    assert found.verdict.text.startswith("realistic")
+    assert any(stop.endswith("the muscles that move it sideways can do no more") for stop in found.verdict.stops)
+    index, middle = ([row for row in found.rows if row.digit == name][-1] for name in ("index", "middle"))
+    # 0.18 of 59 N is what the index does with its pad; between the fingers the lever is shorter
+    assert 0.5 * 10.6 < index.force_n < 3.0 * 10.6
+    assert index.force_n == pytest.approx(middle.force_n, rel=1e-3)
+    assert index.short_deg > 1.0
+    reached = scene.actor().motion.value("left.index.base.abduction", 10.0)
+    assert float(reached) == pytest.approx(math.radians(index.short_deg - 16.0), abs=1e-5)
+
+
 def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_plate(
     run: Callable[[str], Scene], tmp_path: Path
 ) -> None:
@@ -76,9 +113,9 @@ def test_a_rigid_one_is_refused_before_it_is_solved_where_its_bone_lies_in_the_p
 def test_what_has_stopped_is_kept_for_a_run_that_goes_on() -> None:
     load = DigitLoad("LEFT", "left.index", 12.0, 0.2, 2.9e5, 0.5, "CAN")
     content = {
-        "caps": [["LEFT", "left.index", 2.0, 3.0, [[7, [0.3, 0.31]], [8, [0.5, 0.5]]]]],
+        "caps": [["LEFT", "left.index", 0, 2.0, 3.0, [[7, [0.3, 0.31]], [8, [0.5, 0.5]]]]],
         "loads": [asdict(load)],
-        "stuck": [["LEFT", "left.index"]],
+        "stuck": [["LEFT", "left.index", -1]],
         "stops": [asdict(Stop("LEFT", "left.index", 26.5, "its muscles can do no more"))],
     }
     limits = ForceLimits({}, 3e5, {}, None)  # type: ignore[arg-type]

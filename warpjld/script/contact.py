@@ -21,7 +21,6 @@ from warpjld.script.scene import SplineConstants
 from warpjld.script.staging import stage
 from warpjld.simulation.specification import located
 from warpjld.skeleton import CHANNELS, poses_from_angles
-from warpjld.skeleton.channels import FLEXION
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering
@@ -189,7 +188,7 @@ class SceneAnimation:
 
 def write_keys(actor: Actor, edit: AngleEdit) -> None:
     """Set the keys of an edit; the curve before it is preserved by a key at every frame."""
-    channel = f"{actor.skeleton.names[edit.joint]}.{CHANNELS[FLEXION]}"
+    channel = f"{actor.skeleton.names[edit.joint]}.{CHANNELS[edit.channel]}"
     track = actor.motion.tracks[channel]
     if edit.frame is None:
         later = [key for key in track.keys if key.frame > edit.kept]

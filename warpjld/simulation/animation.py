@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.skeleton.channels import FLEXION
+
 if TYPE_CHECKING:
     from warpjld.covering import Covering
     from warpjld.fem.contact import Obstacle
@@ -25,15 +27,16 @@ __all__ = ["ActorAnimation", "AngleEdit", "Animation", "ObjectAnimation"]
 
 @dataclass(frozen=True)
 class AngleEdit:
-    """Change of one joint's flexion relative to the animation.
+    """Change of one angle of a joint relative to the animation.
 
     Attributes:
         actor: Name of the actor.
         joint: Index of the joint in its skeleton.
         kept: Last frame that the edit leaves unchanged.
-        frame: Frame at which the joint flexes by ``value``; None: every frame after ``kept`` whose angle equals the one
-            at ``kept``.
-        value: Flexion [rad].
+        frame: Frame at which the angle is ``value``; None: every frame after ``kept`` whose angle equals the one at
+            ``kept``.
+        value: The angle [rad].
+        channel: Which angle, as in ``CHANNELS``; flexion by default.
     """
 
     actor: str
@@ -41,6 +44,7 @@ class AngleEdit:
     kept: float
     frame: float | None
     value: float
+    channel: int = FLEXION
 
 
 class ActorAnimation(Protocol):

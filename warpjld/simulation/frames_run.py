@@ -30,6 +30,7 @@ from warpjld.simulation.solve.falling import Falls
 from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits
 from warpjld.simulation.solve.grasp_balance import weight_of
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
+from warpjld.simulation.solve.settle import free_objects, settled
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
 from warpjld.simulation.solve.substeps import Substeps
 from warpjld.simulation.solve_result import KnownEquilibrium, SolveResult
@@ -105,7 +106,7 @@ class FramesRun:
 
     def solve(self, frame: float) -> SolveResult | None:
         """Solve and append a frame; returns the final result if the frame cannot be solved."""
-        model, time, before = self.model, frame - self.model.start, self.last
+        model, time, before = self.model, frame - self.model.start, self._settled_objects(frame - self.model.start)
         now = np.zeros_like(model.body.mesh.nodes) if before is None else before.last.displacement
         since = 0.0 if before is None else before.last.time
         steps = self._as_searched(model, since, self.substeps.times(model, since, time, now))
@@ -149,6 +150,14 @@ class FramesRun:
         if all(grip.first != frame for grip in self.contact.grips):  # otherwise after the grip search
             self._settle()
         return None
+
+    def _settled_objects(self, time: float) -> ContactSolution | None:
+        """The last solution; where free objects came to rest on rigid surfaces, with them at rest on flesh."""
+        model, last = self.limits.driven(self.model), self.last
+        names = free_objects(model, None if last is None else last.last.time, time)
+        if not (names and model.hands) or self.request.method == "paper":
+            return last
+        return settled(model, self.history, last, names)
 
     def _as_searched(self, model: ContactModel, since: float, steps: list[float]) -> list[float]:
         """Load steps of a frame in which a grip closes, refined to be no longer than those of the grip search.

@@ -22,7 +22,6 @@ from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.obstacle import placed_motion, rigid_obstacle
 from warpjld.skeleton import CHANNELS, Poses, Skeleton, poses_from_angles
 from warpjld.skeleton.between import poses_between
-from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["RecordedActor", "RecordedAnimation", "RecordedObject"]
 
@@ -134,7 +133,7 @@ class RecordedActor:
         assert self._angles is not None
         angles, frames = self._angles.copy(), self._first + np.arange(len(self._angles))
         for edit in edits:
-            column = angles[:, edit.joint, FLEXION]
+            column = angles[:, edit.joint, edit.channel]
             if edit.frame is None:
                 was = _between(column, edit.kept - self._first)
                 column[(frames > edit.kept) & (column == was)] = edit.value

@@ -24,7 +24,7 @@ from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses
 from warpjld.skeleton.tree import Skeleton
 
-__all__ = ["JOINT_WORDS", "KNUCKLES", "DigitEffort", "Effort", "effort_of"]
+__all__ = ["JOINT_WORDS", "KNUCKLES", "DigitEffort", "Effort", "effort_of", "knuckle_chains"]
 
 KNUCKLES = ("base", "knuckle2", "knuckle3")
 """The three joints of a digit, base first."""
@@ -149,7 +149,7 @@ def effort_of(
     from scipy.spatial.transform import Rotation
 
     allowed = force_limits(limits)
-    chains = _chains(skeleton)
+    chains = knuckle_chains(skeleton)
     if not chains:
         raise InputError("muscles: this skeleton has no digits")
     out = []
@@ -178,7 +178,7 @@ def effort_of(
     return Effort(tuple(out), palm)
 
 
-def _chains(skeleton: Skeleton) -> dict[str, tuple[tuple[int, int, int], int]]:
+def knuckle_chains(skeleton: Skeleton) -> dict[str, tuple[tuple[int, int, int], int]]:
     """Digits of a skeleton, each with its three flexion joints and its tip."""
     found = {}
     for side in ("left.", "right.", ""):

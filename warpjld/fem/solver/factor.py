@@ -7,12 +7,17 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from warpjld.errors import WarpjldError
 from warpjld.fem.arrays import Array, Ints32, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.launch import Launch, grouped, on_rows, shared
 from warpjld.fem.solver.elimination import Elimination, eliminate
 
-__all__ = ["Factor"]
+__all__ = ["CostlyError", "Factor"]
+
+
+class CostlyError(WarpjldError):
+    """A factorisation would take more multiplications than allowed."""
 
 
 class Factor:
@@ -24,15 +29,19 @@ class Factor:
         threads: Number of threads.
         reuse: A factor that is no longer needed: its memory is overwritten, and its order is kept if it has room for
             all entries of this matrix.
+        most: Largest number of multiplications.
 
     Attributes:
         elimination: The elimination order and its fronts.
 
     Raises:
         IndefiniteError: K11 is not positive definite.
+        CostlyError: It takes more multiplications; known before any is made.
     """
 
-    def __init__(self, matrix: BlockMatrix, free: Mask, *, threads: int, reuse: Factor | None = None) -> None:
+    def __init__(
+        self, matrix: BlockMatrix, free: Mask, *, threads: int, reuse: Factor | None = None, most: float = np.inf
+    ) -> None:
         self._free = free
         pattern = matrix.rows, matrix.columns
         if reuse is not None and np.array_equal(reuse._free, free):
@@ -42,6 +51,8 @@ class Factor:
                 return
             pattern = _union(pattern, reuse._pattern)
         found = eliminate(*pattern, np.asarray(free.reshape(-1, 3).any(axis=1)))
+        if found.work > most:
+            raise CostlyError(f"{found.work:.2g} multiplications, more than {most:.2g}")
         self._adopt(found, pattern, (np.empty(found.size + 8), np.empty(found.room + 8)))
         whole = self._factorised(matrix, threads)
         assert whole, "fronts made for a pattern have room for it"

@@ -46,10 +46,12 @@ class LinearSolver:
         hierarchy: Prolongations of an earlier solver for the same mesh.
         reuse: An earlier solver that is no longer needed: its factor is overwritten.
         definite: Whether ``direct`` requires a positive definite matrix.
+        most: Largest number of multiplications of a Cholesky factor.
         threads: Number of threads; all by default.
 
     Raises:
         IndefiniteError: Found during set-up.
+        CostlyError: The Cholesky factor takes more multiplications than ``most``.
         InputError: Unknown method.
     """
 
@@ -65,6 +67,7 @@ class LinearSolver:
         hierarchy: list[Any] | None = None,
         reuse: LinearSolver | None = None,
         definite: bool = True,
+        most: float = np.inf,
         threads: int | None = None,
     ) -> None:
         if method not in METHODS:
@@ -100,7 +103,7 @@ class LinearSolver:
             self._precondition = lambda r: np.einsum("nij,nj->ni", inverse, r.reshape(-1, 3)).ravel().astype(r.dtype)
         elif definite and free.any():
             before = None if reuse is None else reuse.factor
-            self._factor: Factor | _General = Factor(stiffness, free, threads=self.threads, reuse=before)
+            self._factor: Factor | _General = Factor(stiffness, free, threads=self.threads, reuse=before, most=most)
         else:
             self._factor = _General(stiffness, free)
 

@@ -1,4 +1,7 @@
-"""Contact points of rigid bodies with each other and with obstacles, reduced to a few per contact plane."""
+"""Contact points of rigid bodies with each other and with obstacles: all that are near, and a few per contact plane.
+
+Impulses are found for the few, the deepest and outermost of each plane, and for others that would overlap by them.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.obstacle import ClosestPoints
 from warpjld.simulation.fall.rigid_body import RigidBody
 
-__all__ = ["RigidContact", "contacts_with", "contacts_within"]
+__all__ = ["ContactCandidates", "RigidContact", "contacts_with", "contacts_within"]
 
 _ALIKE = np.cos(np.radians(10.0))
 """Cosine of the angle below which normals belong to the same contact plane."""
@@ -61,6 +64,38 @@ class RigidContact:
 
 
 @dataclass(frozen=True, eq=False)
+class ContactCandidates:
+    """All possible contact points of a body with another or with an obstacle; values as in ``RigidContact``, by row.
+
+    Attributes:
+        outermost: Rows of the deepest and outermost points of each contact plane.
+    """
+
+    body: int
+    other: int
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    gaps: NDArray[np.float64]
+    carried: NDArray[np.float64]
+    friction: float
+    own: str
+    name: str
+    outermost: list[int]
+
+    def contact(self, row: int) -> RigidContact:
+        """The contact of a row."""
+        known = self.points[row], self.normals[row], float(self.gaps[row]), self.carried[row]
+        return RigidContact(self.body, self.other, *known, self.friction, self.own, self.name)
+
+    def parting(self, bodies: Sequence[RigidBody]) -> NDArray[np.float64]:
+        """Speeds at which the sides part along the normals [m/s], shape (n,)."""
+        away = bodies[self.body].moving(self.points) - self.carried
+        if self.other >= 0:
+            away = away - bodies[self.other].moving(self.points)
+        return np.asarray(np.einsum("ni,ni->n", away, self.normals))
+
+
+@dataclass(frozen=True, eq=False)
 class _Near:
     """Candidate points [m] (n, 3), unit normals towards the body (n, 3), and gaps [m] (n,)."""
 
@@ -79,7 +114,7 @@ def contacts_with(
     margin: float,
     friction: Callable[[str, str], float],
     shapes: Mapping[str, NDArray[np.float64]],
-) -> list[RigidContact]:
+) -> list[ContactCandidates]:
     """Contact points of a body, or a part of it, with obstacles that are closer than a margin.
 
     Args:
@@ -99,19 +134,17 @@ def contacts_with(
         sets = [near]
         if not body.shape.radius:
             sets.append(_reversed(body, shapes[name], margin))
-        for points, normals, gaps in _sides(sets):
-            after = obstacle.carried(points, time, time + step)
-            carried = (after - points) / length
-            mu = friction(body.shape.name, name)
-            rows = zip(points, normals, gaps, carried, strict=True)
-            own = body.shape.name
-            out += [RigidContact(number, -1, p, n, float(g), c, mu, own, name) for p, n, g, c in rows]
+        found = _joined(sets)
+        if len(found.gaps):
+            after = obstacle.carried(found.points, time, time + step)
+            own = body.shape.name, name
+            out.append(_near_points(number, -1, found, (after - found.points) / length, friction(*own), *own))
     return out
 
 
 def contacts_within(
     bodies: Sequence[RigidBody], margin: float, friction: Callable[[str, str], float]
-) -> list[RigidContact]:
+) -> list[ContactCandidates]:
     """Contact points between bodies that are closer than a margin [m]."""
     out = []
     parts = [(k, part) for k, body in enumerate(bodies) for part in body.parts]
@@ -125,11 +158,9 @@ def contacts_within(
             if not one.shape.radius:
                 back = _near(other, one.project, margin)
                 sets.append(_Near(back.points, -back.normals, back.gaps))
-            mu, still = friction(one.shape.name, other.shape.name), np.zeros(3)
-            for points, normals, gaps in _sides(sets):
-                rows = zip(points, normals, gaps, strict=True)
-                names = one.shape.name, other.shape.name
-                out += [RigidContact(k, m, p, n, float(g), still, mu, *names) for p, n, g in rows]
+            found, names = _joined(sets), (one.shape.name, other.shape.name)
+            if len(found.gaps):
+                out.append(_near_points(k, m, found, np.zeros_like(found.points), friction(*names), *names))
     return out
 
 
@@ -166,14 +197,24 @@ def _reversed(body: RigidBody, shape: NDArray[np.float64], margin: float) -> _Ne
     return _Near(close[near], -found.normal[near], found.distance[near])
 
 
-def _sides(
-    sets: Sequence[_Near],
-) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
-    """Points (k, 3), normals and gaps of each contact plane, reduced to the deepest point and the outermost ones."""
+def _joined(sets: Sequence[_Near]) -> _Near:
+    """Candidates of several sets."""
     points = np.concatenate([one.points for one in sets])
     normals = np.concatenate([one.normals for one in sets])
-    gaps = np.concatenate([one.gaps for one in sets])
-    out = []
+    return _Near(points, normals, np.concatenate([one.gaps for one in sets]))
+
+
+def _near_points(
+    body: int, other: int, near: _Near, carried: NDArray[np.float64], friction: float, own: str, name: str
+) -> ContactCandidates:
+    values = near.points, near.normals, near.gaps, carried
+    return ContactCandidates(body, other, *values, friction, own, name, _outermost(near))
+
+
+def _outermost(near: _Near) -> list[int]:
+    """Rows of the deepest and the outermost points of each contact plane."""
+    points, normals, gaps = near.points, near.normals, near.gaps
+    out: list[int] = []
     left = np.ones(len(gaps), dtype=bool)
     for _ in range(_SIDES):
         if not left.any():
@@ -186,6 +227,5 @@ def _sides(
         flat = points[side] @ across.T
         directions = np.stack([np.cos(_AROUND), np.sin(_AROUND)])
         outer = flat @ directions - _DEEP * (gaps[side] - gaps[deepest])[:, None]
-        chosen = np.unique([deepest, *side[np.argmax(outer, axis=0)]])
-        out.append((points[chosen], normals[chosen], gaps[chosen]))
+        out += np.unique([deepest, *side[np.argmax(outer, axis=0)]]).tolist()
     return out

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.fem.contact import Obstacle
 from warpjld.fem.contact.obstacles.obstacle import Rigid
-from warpjld.simulation.fall.contact_points import RigidContact, contacts_with, contacts_within
+from warpjld.simulation.fall.contact_points import ContactCandidates, RigidContact, contacts_with, contacts_within
 from warpjld.simulation.fall.impulses import impulses, jacobian
 from warpjld.simulation.fall.rigid_body import RigidBody
 
@@ -34,6 +34,10 @@ _PARTED = 0.2
 """Fraction of an overlap that is corrected per step."""
 _SLOP = 1e-5
 """Gap at which bodies come to rest [m], so that the deformable contact solve starts without overlap."""
+_MISSED, _ROUNDS = 1e-6, 20
+"""Overlap by the end of a step from which a near point is added to those that impulses are found for [m], and most
+rounds of that. On curved skin a plate is borne by points that are not the outermost: without them it fell by a
+tenth of a millimetre whenever one of them was left out, and never came to rest."""
 
 
 def steps_of(frames: float, rate: float) -> int:
@@ -79,12 +83,12 @@ def step_bodies(
         if one.touching:
             one.spin = one.spin / (1.0 + ROLLING * length)
     margins = [_NEAR + 2.0 * length * one.speed for one in bodies]
-    contacts = contacts_within(bodies, max(margins, default=0.0), friction)
+    near = contacts_within(bodies, max(margins, default=0.0), friction)
     shapes = {name: _shape(obstacle, time) for name, obstacle in obstacles.items()}
     for k, one in enumerate(bodies):
         for part in one.parts:
-            contacts += contacts_with(k, part, obstacles, time, step, length, margins[k], friction, shapes)
-    pressed, parting = _impelled(bodies, contacts, length)
+            near += contacts_with(k, part, obstacles, time, step, length, margins[k], friction, shapes)
+    pressed, parting = _impelled(bodies, near, length)
     for k, one in enumerate(bodies):
         mine = [c for c in pressed if k in (c.body, c.other)]
         names = [c.name if c.body == k else c.own for c in mine]
@@ -111,7 +115,7 @@ def _shape(obstacle: Obstacle, time: float) -> NDArray[np.float64]:
 
 
 def _impelled(
-    bodies: Sequence[RigidBody], contacts: Sequence[RigidContact], length: float
+    bodies: Sequence[RigidBody], near: Sequence[ContactCandidates], length: float
 ) -> tuple[list[RigidContact], NDArray[np.float64]]:
     """Apply contact impulses to the velocities of bodies.
 
@@ -120,27 +124,51 @@ def _impelled(
         bodies' velocities, shape (B, 6) [m/s, rad/s].
     """
     parting = np.zeros((len(bodies), 6))
-    if not contacts:
+    rows = [list(one.outermost) for one in near]
+    if not any(rows):
         return [], parting
-    rows = jacobian(bodies, contacts)
-    inverse = np.zeros((6 * len(bodies), 6 * len(bodies)))
-    for k, one in enumerate(bodies):
-        inverse[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = np.eye(3) / one.shape.mass
-        inverse[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = one.inverse
-    moves = inverse @ rows.T
-    delassus = rows @ moves
     velocity = np.concatenate([np.concatenate([one.velocity, one.spin]) for one in bodies])
-    carried = np.concatenate([c.axes @ c.carried for c in contacts])
-    gaps = np.array([c.gap - _SLOP for c in contacts])
-    friction = np.array([c.friction for c in contacts])
-    free = rows @ velocity - carried
-    found = impulses(delassus, free, np.maximum(gaps, 0.0) / length, friction)
-    after = (velocity + moves @ found).reshape(-1, 6)
-    for k, one in enumerate(bodies):
-        one.velocity, one.spin = after[k, :3], after[k, 3:]
+    inverse = _inverses(bodies)
+    for _ in range(_ROUNDS):
+        contacts = [one.contact(row) for one, mine in zip(near, rows, strict=True) for row in mine]
+        relative = jacobian(bodies, contacts)
+        moves = inverse @ relative.T
+        delassus = relative @ moves
+        free = relative @ velocity - np.concatenate([c.axes @ c.carried for c in contacts])
+        gaps = np.array([c.gap - _SLOP for c in contacts])
+        friction = np.array([c.friction for c in contacts])
+        found = impulses(delassus, free, np.maximum(gaps, 0.0) / length, friction)
+        for one, after in zip(bodies, (velocity + moves @ found).reshape(-1, 6), strict=True):
+            one.velocity, one.spin = after[:3], after[3:]
+        if not _added(bodies, near, rows, length):
+            break
     if (gaps < 0.0).any():
-        corrections = impulses(delassus, np.zeros(len(rows)), _PARTED * gaps / length, np.zeros(len(gaps)))
+        corrections = impulses(delassus, np.zeros(3 * len(gaps)), _PARTED * gaps / length, np.zeros(len(gaps)))
         parting = (moves @ corrections).reshape(-1, 6)
     known = zip(contacts, found[::3], free[::3], strict=True)
     pressed = [replace(c, closing=-float(v)) for c, p, v in known if p > 0.0]
     return pressed, parting
+
+
+def _inverses(bodies: Sequence[RigidBody]) -> NDArray[np.float64]:
+    """Inverse masses and inertia tensors of all bodies, shape (6B, 6B)."""
+    out = np.zeros((6 * len(bodies), 6 * len(bodies)))
+    for k, one in enumerate(bodies):
+        out[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = np.eye(3) / one.shape.mass
+        out[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = one.inverse
+    return out
+
+
+def _added(
+    bodies: Sequence[RigidBody], near: Sequence[ContactCandidates], rows: Sequence[list[int]], length: float
+) -> bool:
+    """Add to ``rows`` of each pair the point that would overlap most at the end of the step; False if none would."""
+    out = False
+    for one, mine in zip(near, rows, strict=True):
+        overlap = -np.maximum(one.gaps - _SLOP, 0.0) - length * one.parting(bodies)
+        overlap[mine] = 0.0
+        worst = int(np.argmax(overlap))
+        if overlap[worst] > _MISSED:
+            mine.append(worst)
+            out = True
+    return out

@@ -18,6 +18,10 @@ _OPPOSED = 0.1
 _SLIGHT = 0.1
 """Forces below this are not reported [N]."""
 
+_LIES = 0.01
+"""Share of a free object's weight that may be left over where the forces on it bear it; equilibria are found to 1e-4 of
+all forces, those of other bodies included."""
+
 
 @dataclass(frozen=True, eq=False)
 class ObjectBalance:
@@ -33,6 +37,7 @@ class ObjectBalance:
             gentlest grip may slide at every point, and be in balance all the same.
         weight: Assumed weight of a rigid object [N]; 0 for a deformable one.
         borne: Whether something else balances a resultant: its animation, HOLD, a support, or gravity.
+        lies: Whether nothing else holds it, and the forces bear its weight.
     """
 
     object: str
@@ -43,6 +48,7 @@ class ObjectBalance:
     by_hands: bool
     weight: float
     borne: bool
+    lies: bool = False
 
     @property
     def net(self) -> float:
@@ -66,6 +72,8 @@ class ObjectBalance:
         out = f"on {self.object} {self.pressing:.3g} N press"
         if not self.borne or self.net < _SLIGHT:
             return f"{out}, and balance"
+        if self.lies:
+            return f"{out}, and bear its weight"
         bears = f"what holds {self.object} in its place bears them"
         return f"{out}, of which {self.net:.3g} N and {turn:.2g} N m are left over: {bears}"
 
@@ -98,11 +106,16 @@ def balances(model: ContactModel, solved: SolvedFrame) -> list[ObjectBalance]:
         lifted = support is not None and solved.frame - model.start >= support.free - 1e-9
         kept = one is not None and (bool(one.states) or support is not None)
         borne = one is None or kept or any(model.loads.gravity)
+        pull = np.zeros(3) if one is None else model.pull(name).sum(axis=0)
+        left = float(np.linalg.norm(force + pull))
+        lies = one is not None and not kept and left <= _LIES * float(np.linalg.norm(pull))
         if lifted:  # its weight is what the hand bears
-            force = force + model.pull(name).sum(axis=0)
+            force = force + pull
         weight = weight_of(model.obstacles[name], solved.frame - model.start) if one is None else 0.0
         out.append(
-            ObjectBalance(name, solved.frame, force, moment, pressing, others <= hands and not kept, weight, borne)
+            ObjectBalance(
+                name, solved.frame, force, moment, pressing, others <= hands and not kept, weight, borne, lies
+            )
         )
     return out
 

@@ -17,7 +17,7 @@ from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.report.efforts import effort_at
 from warpjld.simulation.solve.solved_frame import SolvedFrame
-from warpjld.skeleton.channels import FLEXION
+from warpjld.skeleton.channels import ABDUCTION, FLEXION
 
 __all__ = ["ContactRow", "ContactTable", "JointOpening", "csv_cell", "digit_rows", "write_table"]
 
@@ -50,8 +50,8 @@ class ContactRow:
             limit; NaN for the palm.
         sliding: Share of the contact area that slides; NaN without contact.
         state: ``free``, ``sticking``, ``sliding``, or ``partly sliding``.
-        short_deg: Largest lag of a joint's flexion in this digit behind the requested animation [degrees]; 0 without a
-            lag, and for the palm.
+        short_deg: Largest lag of a joint's flexion or abduction in this digit behind the requested animation [degrees];
+            0 without a lag, and for the palm.
     """
 
     frame: float
@@ -123,11 +123,11 @@ class ContactTable:
         return None if reason is None else f"stopped at frame {solved.frame:g}: {reason}"
 
     def _short(self, hand: FleshBody, frame: float) -> dict[str, float]:
-        """Largest lag of each digit's flexions behind the requested animation [degrees]."""
+        """Largest lag of each digit's angles behind the requested animation [degrees]."""
         if self._requested is None or not hand.bones.bendable:
             return {}
-        requested = self._requested.actors[hand.name].angles(frame)[:, FLEXION]
-        missing = np.degrees(requested - hand.bones.animation.angles(frame)[:, FLEXION])
+        lag = np.degrees(self._requested.actors[hand.name].angles(frame) - hand.bones.animation.angles(frame))
+        missing = np.maximum(lag[:, FLEXION], np.abs(lag[:, ABDUCTION]))
         out: dict[str, float] = {}
         for joint, name in enumerate(hand.bones.skeleton.names):
             digit, knuckle = name.split(".")[-2:] if name.count(".") else ("", name)

@@ -14,6 +14,7 @@ from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.solved_frame import SolvedFrame
+from warpjld.skeleton.channels import CHANNELS
 
 __all__ = ["check_checkpoint", "plain_record"]
 
@@ -119,6 +120,8 @@ def _check_edit(edit: AngleEdit, model: ContactModel) -> None:
     actors = {hand.name: hand.bones.skeleton for hand in model.hands}
     if edit.actor not in actors or not 0 <= edit.joint < len(actors[edit.actor]):
         raise InputError(f"it edits joint {edit.joint} of '{edit.actor}', which is not there")
+    if not 0 <= edit.channel < len(CHANNELS):
+        raise InputError(f"it edits angle {edit.channel} of a joint: want 0 … {len(CHANNELS) - 1}")
 
 
 def _check(array: Any, shape: tuple[int, ...], what: str, kind: Any = np.float64, *, unknown: bool = False) -> None:

@@ -1,27 +1,52 @@
-"""Upper bounds on the flexions of a digit that vary linearly over time."""
+"""Bounds on the angles by which a digit closes or moves sideways, that vary linearly over time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.hand.muscles import KNUCKLES
 from warpjld.skeleton import DIGITS, Skeleton
-from warpjld.skeleton.channels import FLEXION
+from warpjld.skeleton.channels import ABDUCTION, FLEXION
 
-__all__ = ["FlexionRamp", "closing_joints", "held_angles"]
+__all__ = ["AngleRamp", "DigitMotion", "closing_joints", "held_angles", "limited_joints"]
+
+
+class DigitMotion(NamedTuple):
+    """A motion of a digit that forces may limit.
+
+    Attributes:
+        actor: Name of the actor.
+        digit: Name of its digit in the skeleton.
+        sideways: 0 for closing (flexions that increase); 1 or -1 for an abduction that increases or decreases.
+    """
+
+    actor: str
+    digit: str
+    sideways: int = 0
+
+    @property
+    def channel(self) -> int:
+        """Channel of its angles."""
+        return ABDUCTION if self.sideways else FLEXION
+
+    @property
+    def sign(self) -> int:
+        """1 for angles that increase, -1 for those that decrease."""
+        return self.sideways or 1
 
 
 @dataclass(frozen=True)
-class FlexionRamp:
-    """Largest flexions of a digit's joints, interpolated linearly between two times.
+class AngleRamp:
+    """How far the angles of a digit's joints may go, interpolated linearly between two times.
 
     Attributes:
         begin, end: The times [frames].
-        most: Largest flexions at both times [rad], by joint.
+        most: The angles at both times [rad], by joint.
     """
 
     begin: float
@@ -29,18 +54,21 @@ class FlexionRamp:
     most: Mapping[int, tuple[float, float]]
 
     def at(self, joint: int, time: float) -> float:
-        """Largest flexion of a joint at a time [rad]; constant outside the ramp."""
+        """How far a joint may go at a time [rad]; constant outside the ramp."""
         first, last = self.most[joint]
         share = (time - self.begin) / (self.end - self.begin) if self.end > self.begin else 1.0
         return first + min(1.0, max(0.0, share)) * (last - first)
 
 
-def held_angles(angles: NDArray[np.float64], ramps: Iterable[FlexionRamp], time: float) -> NDArray[np.float64]:
-    """Joint angles [rad], shape (J, 4), with flexions limited by ramps at a time."""
+def held_angles(
+    angles: NDArray[np.float64], ramps: Iterable[tuple[DigitMotion, AngleRamp]], time: float
+) -> NDArray[np.float64]:
+    """Joint angles [rad], shape (J, 4), limited by the ramps of motions at a time."""
     out = np.array(angles)
-    for ramp in ramps:
+    for motion, ramp in ramps:
+        channel, sign = motion.channel, motion.sign
         for joint in ramp.most:
-            out[joint, FLEXION] = min(out[joint, FLEXION], ramp.at(joint, time))
+            out[joint, channel] = sign * min(sign * out[joint, channel], sign * ramp.at(joint, time))
     return out
 
 
@@ -52,3 +80,9 @@ def closing_joints(skeleton: Skeleton) -> dict[str, list[int]]:
         if knuckle in KNUCKLES and digit.rpartition(".")[2] in DIGITS:
             out.setdefault(digit, []).append(joint)
     return out
+
+
+def limited_joints(skeleton: Skeleton, motion: DigitMotion) -> list[int]:
+    """Indices of the joints of a motion: those that close a digit, or its base, which moves it sideways."""
+    joints = closing_joints(skeleton)[motion.digit]
+    return joints[:1] if motion.sideways else joints

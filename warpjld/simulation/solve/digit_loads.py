@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpjld.fem.contact import ContactInstant
 from warpjld.fem.hand.bone_loads import loads_from_contact
 from warpjld.fem.hand.muscles import effort_of
+from warpjld.fem.hand.sideways import sideways_shares
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.grasp_balance import allowed_net
@@ -34,6 +35,8 @@ class DigitLoad:
         peak: Highest pressure on its skin [Pa].
         unopposed: Net force on a grasped object over the allowed one, if the digit pushes in its direction; else 0.
         pushed: Name of that object.
+        sideways: Moment about its axis of abduction over what its muscles bear; positive where the load resists an
+            increase of the abduction.
     """
 
     actor: str
@@ -43,16 +46,27 @@ class DigitLoad:
     peak: float
     unopposed: float = 0.0
     pushed: str = ""
+    sideways: float = 0.0
 
-    def share(self, pressure: float) -> float:
-        """Largest ratio of load to limit, where ``pressure`` [Pa] is the limit of its skin."""
+    def share(self, pressure: float, sideways: int = 0) -> float:
+        """Largest ratio of load to limit, where ``pressure`` [Pa] is the limit of its skin.
+
+        Args:
+            pressure: [Pa].
+            sideways: 0 for closing; 1 or -1 for abduction that increases or decreases: 0 if no load resists it.
+        """
+        if sideways:
+            resisted = sideways * self.sideways
+            return max(resisted, self.peak / pressure) if resisted > 0.0 else 0.0
         return max(self.muscles, self.peak / pressure, self.unopposed)
 
-    def bound(self, pressure: float) -> str:
+    def bound(self, pressure: float, sideways: int = 0) -> str:
         """Which limit determines ``share``, in words."""
-        if self.unopposed >= self.share(pressure):
+        if sideways and sideways * self.sideways >= self.peak / pressure:
+            return "the muscles that move it sideways can do no more"
+        if not sideways and self.unopposed >= self.share(pressure):
             return f"nothing opposes it, it would push {self.pushed} away"
-        if self.muscles >= self.peak / pressure:
+        if not sideways and self.muscles >= self.peak / pressure:
             return "its muscles can do no more"
         return f"its skin is pressed with {1e-3 * pressure:.3g} kPa"
 
@@ -80,13 +94,15 @@ def digit_loads(
     loads = loads_from_contact(hand.hand, instant.displacement[span], nodal)
     poses = hand.bones.posed(angles, instant.time)
     effort = effort_of(hand.bones.skeleton, poses, loads, limits=limits)
+    sideways = sideways_shares(hand.bones.skeleton, poses, loads, limits)
     pushes = _pushes(model, hand, instant, weights)
     peaks = peaks_of(model, hand, solved_frame(0.0, [instant]))
     out = {}
     for one in effort.digits:
         short = one.digit.rpartition(".")[2]
         pushed, share = pushes.get(short, ("", 0.0))
-        out[one.digit] = DigitLoad(hand.name, one.digit, one.force, one.share, peaks.get(short, 0.0), share, pushed)
+        most = one.share, peaks.get(short, 0.0), share, pushed, sideways[one.digit]
+        out[one.digit] = DigitLoad(hand.name, one.digit, one.force, *most)
     return out
 
 

@@ -1,8 +1,9 @@
-"""Force-limited closing of digits: a digit stops where its muscles or its skin reach their limits (R118, R119).
+"""Force-limited motion of digits: a digit stops where its muscles or its skin reach their limits (R118, R119).
 
 An animation closes digits by prescribed angles; the resulting forces are those of the flesh, which stiffens without
 bound between a bone and a wall. A real hand is limited by force. So a digit whose load reaches a limit keeps its
 flexions there while the other digits go on; it continues when its load has dropped, and opens as the animation does.
+The same holds for its abduction, either way, against what the muscles bear that move it sideways.
 
 The angle at which a digit reaches its limit between two equilibria is found by a chord (secant): forces of flesh are
 convex in the angle, so the chord's point lies short of the limit, never beyond it. A digit that ends well short of its
@@ -27,9 +28,8 @@ from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.bone_clearance import BoneClearance, TightBone
 from warpjld.simulation.solve.branch import solve_onward
-from warpjld.simulation.solve.digit_caps import FlexionRamp, closing_joints, held_angles
+from warpjld.simulation.solve.digit_caps import AngleRamp, DigitMotion, closing_joints, held_angles, limited_joints
 from warpjld.simulation.solve.digit_loads import DigitLoad, digit_loads
-from warpjld.skeleton.channels import FLEXION
 
 __all__ = ["BoneInsideError", "ForceLimits", "Stop"]
 
@@ -38,7 +38,7 @@ class BoneInsideError(WarpjldError):
     """A bone would lie inside an object; the message names the frame."""
 
 
-_Key = tuple[str, str]
+_Digit = tuple[str, str]
 """Name of an actor, and of its digit in the skeleton."""
 
 _SAME = 1e-9
@@ -71,7 +71,7 @@ class Stop:
     Attributes:
         actor: Name of the actor.
         digit: Name of the digit in the skeleton.
-        frame: Frame from which on it keeps its flexions.
+        frame: Frame from which on it keeps its angles.
         why: Reason in words.
     """
 
@@ -83,7 +83,7 @@ class Stop:
 
 @dataclass(eq=False)
 class ForceLimits:
-    """State of the force limits: which digits have stopped, and at which flexions.
+    """State of the force limits: which motions of digits have stopped, and at which angles.
 
     Attributes:
         strength: Force limits of digits that differ from the default [N], by actor and digit.
@@ -98,11 +98,11 @@ class ForceLimits:
     weights: Mapping[str, float]
     clearance: BoneClearance
     stops: list[Stop] = field(default_factory=list)
-    _caps: dict[_Key, FlexionRamp] = field(default_factory=dict)
-    _course: dict[_Key, FlexionRamp] = field(default_factory=dict)
-    _until: dict[_Key, float] = field(default_factory=dict)
-    _loads: dict[_Key, DigitLoad] = field(default_factory=dict)
-    _stuck: set[_Key] = field(default_factory=set)
+    _caps: dict[DigitMotion, AngleRamp] = field(default_factory=dict)
+    _course: dict[DigitMotion, AngleRamp] = field(default_factory=dict)
+    _until: dict[DigitMotion, float] = field(default_factory=dict)
+    _loads: dict[_Digit, DigitLoad] = field(default_factory=dict)
+    _stuck: set[DigitMotion] = field(default_factory=set)
 
     def solve(
         self, model: ContactModel, history: History, before: ContactSolution | None, times: Sequence[float]
@@ -139,32 +139,32 @@ class ForceLimits:
     def restore(self, content: Mapping[str, Any]) -> None:
         """Restore the state that ``content`` returned."""
         self._caps = {
-            (actor, digit): FlexionRamp(begin, end, {joint: tuple(most) for joint, most in joints})
-            for actor, digit, begin, end, joints in content.get("caps", [])
+            DigitMotion(*key): AngleRamp(begin, end, {joint: tuple(most) for joint, most in joints})
+            for *key, begin, end, joints in content.get("caps", [])
         }
         loads = [DigitLoad(**load) for load in content.get("loads", [])]
         self._loads = {(load.actor, load.digit): load for load in loads}
-        self._stuck = {(actor, digit) for actor, digit in content.get("stuck", [])}
+        self._stuck = {DigitMotion(*key) for key in content.get("stuck", [])}
         self.stops = [Stop(**stop) for stop in content.get("stops", [])]
 
     def edits(self, model: ContactModel, since: float, time: float) -> tuple[AngleEdit, ...]:
-        """Edits of the animation at ``time`` for flexions that are limited, valid after ``since``."""
+        """Edits of the animation at ``time`` for angles that are limited, valid after ``since``."""
         out = []
         for hand in _bendable(model):
-            wanted, reached = hand.bones.angles(time)[:, FLEXION], self._angles(hand, time)[:, FLEXION]
-            for joint in np.flatnonzero(reached < wanted - _SAME).tolist():
-                value = float(reached[joint])
-                out.append(AngleEdit(hand.name, joint, model.start + since, model.start + time, value))
+            wanted, reached = hand.bones.angles(time), self._angles(hand, time)
+            for joint, channel in np.argwhere(np.abs(reached - wanted) > _SAME).tolist():
+                value = float(reached[joint, channel])
+                out.append(AngleEdit(hand.name, joint, model.start + since, model.start + time, value, channel))
         return tuple(out)
 
     def driven(self, model: ContactModel) -> ContactModel:
-        """The model with the flexions of stopped digits limited."""
-        stopped = {actor for actor, _ in self._caps}
+        """The model with the angles of stopped digits limited."""
+        stopped = {motion.actor for motion in self._caps}
         hands = [self._capped(hand) if hand.name in stopped else hand for hand in model.hands]
         return replace(model, hands=tuple(hands))
 
     def _capped(self, hand: FleshBody) -> FleshBody:
-        caps = [ramp for (actor, _), ramp in self._caps.items() if actor == hand.name]  # a copy: self._caps changes
+        caps = [one for one in self._caps.items() if one[0].actor == hand.name]  # a copy: self._caps changes
         return replace(
             hand, moves=lambda time: hand.bones.moves_of(held_angles(hand.bones.angles(time), caps, time), time)
         )
@@ -193,14 +193,15 @@ class ForceLimits:
         driven, closing = self.driven(model), self._closing(model, now, times[-1])
         for time in times:
             inside = [bone for bone in self.clearance.nearest(driven, time) if bone.left <= 0.0]
-            carried = [bone for bone in inside if _key_of(closing, bone) is None]
+            carried = [bone for bone in inside if not any(_moves(key, bone) for key in closing)]
             if carried:
                 worst = min(carried, key=lambda bone: bone.left)
                 raise BoneInsideError(f"at frame {model.start + time:.4g}: {worst.text}")
 
     def _left(self, model: ContactModel, time: float) -> dict[tuple[str, str, str], float]:
-        """Relative thickness of the flesh over bones, by actor, digit and object."""
-        return {(one.actor, one.digit, one.object): one.left for one in self.clearance.nearest(model, time)}
+        """Relative thickness of the flesh over bones and between those of two digits, by actor, digit and object."""
+        found = [*self.clearance.nearest(model, time), *self.clearance.between_digits(model, time)]
+        return {(one.actor, one.digit, one.object): one.left for one in found}
 
     def _step(
         self, model: ContactModel, history: History, before: ContactSolution | None, now: float, time: float
@@ -220,46 +221,52 @@ class ForceLimits:
                 self._stop_loaded(model, closing, now, time)
                 continue
             loads = self._loads_at(model, found)
-            over = [key for key in closing if key in loads and loads[key].share(self.pressure) > 1.0]
+            would_be = {key: self._share_in(loads, key) for key in closing}
+            over = {key: would for key, would in would_be.items() if would > 1.0}
             if not over:
                 self._loads = loads
                 return found
-            for key in over:
-                was, would = self._share(key), loads[key].share(self.pressure)
+            for key, would in over.items():
+                was = self._share(key)
                 part = (_AIM - was) / (would - was) if was < _AIM and tried < _TRIES else 0.0
                 moved = self._until.get(key, time) - now  # it may have stopped within the step already
-                self._stop(model, key, now, time, now + part * moved, loads[key].bound(self.pressure))
+                why = loads[key[:2]].bound(self.pressure, key.sideways)
+                self._stop(model, key, now, time, now + part * moved, why)
         raise AssertionError
 
     def _spare_bones(self, model: ContactModel, now: float, time: float) -> None:
         """Stop digits in whose motion a bone comes too near to an object."""
         closing = self._closing(model, now, time)
-        near = {_key_of(closing, one) for one in self.clearance.nearest(self.driven(model), time) if one.left < _SPENT}
+        near = [one for one in self.clearance.nearest(self.driven(model), time) if one.left < _SPENT]
         for key in closing:
-            if key in near:
+            if any(_moves(key, one) for one in near):
                 at = now
                 for look in range(1, _LOOKS):
                     moment = now + (time - now) * look / _LOOKS
                     tight = self.clearance.nearest(self.driven(model), moment)
-                    if any(_key_of(closing, one) == key and one.left < _SPENT for one in tight):
+                    if any(_moves(key, one) and one.left < _SPENT for one in tight):
                         break
                     at = moment
                 self._stop(model, key, now, time, at, "hardly any flesh is left before its bone")
 
-    def _stop_loaded(self, model: ContactModel, closing: Sequence[_Key], now: float, time: float) -> None:
-        """Stop the closing digits that bear a load, or all closing ones if none does."""
+    def _stop_loaded(self, model: ContactModel, closing: Sequence[DigitMotion], now: float, time: float) -> None:
+        """Stop the motions that a load resists, or all of them if there is none."""
         pressing = [key for key in closing if self._share(key) > 0.0]
         for key in pressing or closing:
             self._stop(model, key, now, time, now, "no equilibrium was found beyond")
             self._stuck.add(key)
 
-    def _share(self, key: _Key) -> float:
-        """Load to limit ratio of a digit at the last equilibrium."""
-        return self._loads[key].share(self.pressure) if key in self._loads else 0.0
+    def _share(self, key: DigitMotion) -> float:
+        """Load to limit ratio of a motion at the last equilibrium."""
+        return self._share_in(self._loads, key)
 
-    def _loads_at(self, model: ContactModel, found: ContactSolution) -> dict[_Key, DigitLoad]:
+    def _share_in(self, loads: Mapping[_Digit, DigitLoad], key: DigitMotion) -> float:
+        """Load to limit ratio of a motion; 0 without a load."""
+        return loads[key[:2]].share(self.pressure, key.sideways) if key[:2] in loads else 0.0
+
+    def _loads_at(self, model: ContactModel, found: ContactSolution) -> dict[_Digit, DigitLoad]:
         """Loads of all digits at an equilibrium."""
-        out: dict[_Key, DigitLoad] = {}
+        out: dict[_Digit, DigitLoad] = {}
         for hand in _bendable(model):
             angles = self._angles(hand, found.last.time)
             loads = digit_loads(model, hand, angles, found.last, self.strength.get(hand.name), self.weights)
@@ -267,34 +274,36 @@ class ForceLimits:
         return out
 
     def _angles(
-        self, hand: FleshBody, time: float, caps: Mapping[_Key, FlexionRamp] | None = None
+        self, hand: FleshBody, time: float, caps: Mapping[DigitMotion, AngleRamp] | None = None
     ) -> NDArray[np.float64]:
         """Joint angles of a hand, limited by the current ramps or by given ones [rad], shape (J, 4)."""
         ramps = (self._caps if caps is None else caps).items()
-        return held_angles(hand.bones.angles(time), (ramp for (actor, _), ramp in ramps if actor == hand.name), time)
+        return held_angles(hand.bones.angles(time), (one for one in ramps if one[0].actor == hand.name), time)
 
-    def _closing(self, model: ContactModel, now: float, time: float) -> list[_Key]:
-        """Digits with a joint whose flexion increases in a step."""
+    def _closing(self, model: ContactModel, now: float, time: float) -> list[DigitMotion]:
+        """Digits that close in a step, a joint's flexion increasing, or move sideways, their abduction changing."""
         out = []
         for hand in _bendable(model):
-            change = (self._angles(hand, time) - self._angles(hand, now, self._course))[:, FLEXION]
-            digits = closing_joints(hand.bones.skeleton).items()
-            out += [(hand.name, digit) for digit, joints in digits if (change[joints] > _SAME).any()]
+            skeleton, change = hand.bones.skeleton, self._angles(hand, time) - self._angles(hand, now, self._course)
+            motions = (DigitMotion(hand.name, digit, way) for digit in closing_joints(skeleton) for way in (0, 1, -1))
+            for one in motions:
+                if (one.sign * change[limited_joints(skeleton, one), one.channel] > _SAME).any():
+                    out.append(one)
         return out
 
-    def _stop(self, model: ContactModel, key: _Key, now: float, time: float, at: float, why: str) -> None:
-        """Limit a digit's flexions in a step ``now`` … ``time`` to those that its course in the step has at ``at``.
+    def _stop(self, model: ContactModel, key: DigitMotion, now: float, time: float, at: float, why: str) -> None:
+        """Limit a digit's angles in a step ``now`` … ``time`` to those that its course in the step has at ``at``.
 
-        The course is that without stops in this step: a digit that lags behind the animation has smaller flexions at
+        The course is that without stops in this step: a digit that lags behind the animation has gone less far at
         ``now`` than at ``at``.
         """
-        hand = next(one for one in model.hands if one.name == key[0])
-        begin, end = (self._angles(hand, moment, self._course)[:, FLEXION] for moment in (now, at))
-        joints = closing_joints(hand.bones.skeleton)[key[1]]
+        hand = next(one for one in model.hands if one.name == key.actor)
+        begin, end = (self._angles(hand, moment, self._course)[:, key.channel] for moment in (now, at))
+        joints = limited_joints(hand.bones.skeleton, key)
         ends = {joint: (float(begin[joint]), float(end[joint])) for joint in joints}
-        self._caps[key], self._until[key] = FlexionRamp(now, time, ends), at
-        if not any((one.actor, one.digit) == key for one in self.stops):
-            self.stops.append(Stop(*key, model.start + at, why))
+        self._caps[key], self._until[key] = AngleRamp(now, time, ends), at
+        if not any((one.actor, one.digit) == key[:2] for one in self.stops):
+            self.stops.append(Stop(*key[:2], model.start + at, why))
 
     def _relax(self, model: ContactModel, now: float, time: float) -> None:
         """Raise the limits of stopped digits whose load has dropped, so far that flesh is compressed little in a step.
@@ -303,22 +312,21 @@ class ForceLimits:
         """
         for key, ramp in list(self._caps.items()):
             here = {joint: (ramp.at(joint, now),) * 2 for joint in ramp.most}
-            self._caps[key] = held = FlexionRamp(now, time, here)
+            self._caps[key] = held = AngleRamp(now, time, here)
             share = self._share(key)
             if share >= _RELAXED or (key in self._stuck and share > 0.0):
                 continue
             self._stuck.discard(key)
-            hand = next(one for one in model.hands if one.name == key[0])
-            wanted = hand.bones.angles(time)[:, FLEXION]
-            if all(most <= ramp.at(joint, now) for joint, most in enumerate(wanted) if joint in ramp.most):
+            hand = next(one for one in model.hands if one.name == key.actor)
+            wanted = hand.bones.angles(time)[:, key.channel]
+            if all(key.sign * wanted[joint] <= key.sign * most for joint, (most, _) in here.items()):
                 del self._caps[key]
                 continue
             left = self._left(self.driven(model), now)
             for part in _PARTS:
-                ends = {
-                    joint: (most, most + part * max(0.0, wanted[joint] - most)) for joint, (most, _) in here.items()
-                }
-                self._caps[key] = FlexionRamp(now, time, ends)
+                lag = {joint: max(0.0, key.sign * (wanted[joint] - most)) for joint, (most, _) in here.items()}
+                ends = {joint: (most, most + key.sign * part * lag[joint]) for joint, (most, _) in here.items()}
+                self._caps[key] = AngleRamp(now, time, ends)
                 then = self._left(self.driven(model), time)
                 if all(left.get(place, 1.0) - share <= _SQUEEZED for place, share in then.items()):
                     break
@@ -331,5 +339,6 @@ def _bendable(model: ContactModel) -> list[FleshBody]:
     return [hand for hand in model.hands if hand.bones.bendable]
 
 
-def _key_of(keys: Sequence[_Key], bone: TightBone) -> _Key | None:
-    return next((key for key in keys if key[0] == bone.actor and key[1].rpartition(".")[2] == bone.digit), None)
+def _moves(motion: DigitMotion, bone: TightBone) -> bool:
+    """Whether a motion is that of the digit of a bone."""
+    return motion.actor == bone.actor and motion.digit.rpartition(".")[2] == bone.digit
