@@ -43,8 +43,8 @@ _ON = 2
 _WEAK = 0.9
 """Share of the weight that friction must be able to bear with the pressures of an object that slides at every point."""
 _LOST = 2
-"""Attempts at steps that fail while every point slides from which on the object counts as not held: nothing is left that
-could hold it back where Newton's method does not follow."""
+"""Attempts at steps that fail while every point slides, from which on the object counts as not held: no friction is left
+to hold it back."""
 _ALL = 1.0 - 1e-9
 """Share of the contact area that slides from which on all of it counts as sliding."""
 _LEFT = 0.01
