@@ -177,10 +177,9 @@ class Bracket:
         others = [one for one in self._below if one.grip < last.grip]
         step, self._step = self._step, 2.0 * self._step
         before = max(others, key=lambda one: one.grip, default=None)
-        # between a grip without contact and one with it the value hardly tells how it grows
-        if before is not None and last.root > before.root > 0.0:
+        if before is not None and last.root > before.root:
             line = (last.grip - before.grip) / (last.root - before.root)
-            return last.grip + min(max((math.sqrt(self.target) - last.root) * line, _SHORTEST * step), _FARTHEST * step)
+            return last.grip + min(max((math.sqrt(self.target) - last.root) * line, _SHORTEST * step), step)
         return last.grip + step
 
 

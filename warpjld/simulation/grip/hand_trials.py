@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import SensitivityError
 from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.grip.hold import Loaded, WeightTrials
@@ -43,8 +44,8 @@ _ON = 2
 _WEAK = 0.9
 """Share of the weight that friction must be able to bear with the pressures of an object that slides at every point."""
 _LOST = 2
-"""Attempts at steps that fail while every point slides, from which on the object counts as not held: no friction is left
-to hold it back."""
+"""Attempts at steps that fail while every point slides, from which on the object counts as not held: no friction is
+left to hold it back."""
 _ALL = 1.0 - 1e-9
 """Share of the contact area that slides from which on all of it counts as sliding."""
 _LEFT = 0.01
@@ -183,6 +184,16 @@ class HandTrials(WeightTrials):
         """Share of the weight that friction could bear with the pressures before the weight acts; under it, an object
         that rode along is pressed as hard within a tenth, unless it slips."""
         return self.weight.most(self.closed(grip).last)
+
+    def rate(self, grip: float) -> float | None:
+        """Logarithmic derivative of the contact force before the weight acts, without the medium around the object."""
+        closed = self.closed(grip)
+        if not closed.converged or len(closed.last.touches) < 2 or not self.weight.force(closed.last) > 0.0:
+            return None
+        try:
+            return self.weight.rate(*self.squeeze.tangent(grip, closed))
+        except SensitivityError:
+            return None
 
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
         """Largest load share of the hand's muscles, and its digit."""

@@ -42,7 +42,7 @@ _FEW, _MOST = 10, 20
 """Linear solves of a step from which on the drag is not reduced, and with which an attempt ends."""
 _ROUGH, _EXACT, _PART = 1e-2, 1e-4, 0.1
 """Largest and smallest residual of a step with drag, over the forces in balance, and residual over that at its start:
-such states are only passed through. Equilibria have the smallest. Steps take 4 to 6 linear solves instead of 6 to 10."""
+such states are only passed through. Equilibria have the smallest. Steps take 4 to 6 linear solves, not 6 to 10."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,8 +67,8 @@ class GripStatus(Enum):
     STANDS = "it stands on something else, and the hand does not hold it"
     LIMIT = "does not hold at the firmest grip that was allowed"
     NO_SOLUTION = "contact could not be solved"
-    EXHAUSTED = "no grip that holds was found with the linear solves allowed"
-    HELD_SO_FAR = "held, but not by the gentlest grip for certain: the linear solves allowed were spent"
+    EXHAUSTED = "no grip that holds was found with the trials and linear solves allowed"
+    HELD_SO_FAR = "held, but not by the gentlest grip for certain: the trials or linear solves allowed were spent"
     INTERRUPTED = "the search was interrupted before a grip was found"
 
 
@@ -167,9 +167,8 @@ def gentlest_grip(
         friction: Coulomb's μ between hand and object.
         start: First step above ``low`` without contact; by default a sixteenth of the range.
         tolerance: Tolerance of the smallest grip, relative to the force.
-        most: Most trials; after that the smallest grip that held is returned.
-        exhausted: Whether the linear solves allowed are spent, asked after every trial; then the smallest grip that
-            held is returned, or else the one that came nearest.
+        most: Most trials; after that the smallest grip that held is returned, or else the one that came nearest.
+        exhausted: Whether the linear solves allowed are spent, asked after every trial; with the same consequence.
 
     Returns:
         The grip found; if Ctrl-C ends the search, the trials so far with ``GripStatus.INTERRUPTED``.
@@ -215,9 +214,9 @@ class _Search:
                 return self.exhausted()
             ahead = bracket.next()
             if ahead is None or self._narrow():
-                break
+                return self.best(_at_last(self.trials[-1][1]))
             grip = ahead
-        return self.best(_at_last(self.trials[-1][1]))
+        return self.exhausted()
 
     def best(self, otherwise: GripStatus) -> Grip:
         """The smallest grip that held; if none did, the last one tried, with the status ``otherwise``."""
