@@ -16,8 +16,9 @@ solved (else the solver's status); no pressure is above 1 MPa (``crushed``); no 
 (``muscles``); something is touched (``untouched``); no object is left with a net force of the hand above a third of
 what presses on it, and above what it would weigh if it were of water (``unbalanced``). ``newton``: linear solves of the
 searches that found an equilibrium, mean and 90th percentile; ``lost``: those of searches in vain; ``seconds``:
-processor time of the contact solve; ``grip``: how the search for a grip ended. A ``force`` that is not reached because
-nothing opposes more (``UNOPPOSED``) may end plausibly: with less.
+processor time of the contact solve; ``grip``: how the search for a grip ended; ``asked``: whether the hand presses or
+holds as asked, 1 or 0. A ``force`` that is not reached because nothing opposes more (``UNOPPOSED``) may end plausibly,
+with less: it is counted apart.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ DEFORMABLE = ("ball", "can", "lemon")
 TASKS = ("squeeze", "force", "lift")
 COLUMNS = (
     *("hand", "object", "task", "end", "detail", "frames", "of", "newton", "newton90", "steps", "lost", "solves"),
-    *("seconds", "most_n", "peak_kpa", "share", "net_n", "sum_n", "grip"),
+    *("seconds", "most_n", "peak_kpa", "share", "net_n", "sum_n", "grip", "asked"),
 )
 LAST = 30
 UNBALANCED = 1.0 / 3.0
@@ -189,6 +190,7 @@ def judged(found: Any) -> dict[str, Any]:
         "net_n": round(net, 2),
         "sum_n": round(total, 2),
         "grip": ", ".join(grip.status for grip in found.solved.grips),
+        "asked": int(all(grip.reached for grip in found.solved.grips)),
     }
     status = found.solved.status.name
     if status != "CONVERGED":
@@ -307,8 +309,9 @@ def table(rows: list[dict[str, Any]]) -> str:
     shown = [c for c in COLUMNS if c != "detail"]
     out = ["| " + " | ".join(shown) + " |", "|" + "---|" * len(shown)]
     out += ["| " + " | ".join(str(row.get(c, "")) for c in shown) + " |" for row in rows]
-    good = sum(row["end"] == "plausible" for row in rows)
-    return "\n".join([*out, "", f"{good} of {len(rows)} end plausibly"])
+    good = [row for row in rows if row["end"] == "plausible"]
+    asked = sum(str(row.get("asked")) == "1" for row in good)
+    return "\n".join([*out, "", f"{len(good)} of {len(rows)} end plausibly, {asked} of these as asked"])
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warpjld.fem import Body, LinearElastic, Prescribed, box_hexes, merge, prescribe
 from warpjld.fem.contact import ContactSolution, Pair, press
 from warpjld.fem.contact.obstacles.solids import Plane
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import SensitivityError
 from warpjld.fem.load.loads import Loads
 from warpjld.fem.mesh.hexmesh import HexMesh
 from warpjld.script import Interpreter, Scene
@@ -73,6 +74,9 @@ class Squeeze:
 
     def stays(self, grip: float) -> tuple[str, Callable[[float], float]]:
         return self.hand.name, lambda share: grip
+
+    def tangent(self, grip: float, closed: ContactSolution) -> None:
+        raise SensitivityError("not of ways")
 
     def effort(self, grip: float, instant: object) -> SimpleNamespace:
         return SimpleNamespace(digits=[SimpleNamespace(share=0.1, digit="pad")])

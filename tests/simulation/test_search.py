@@ -96,7 +96,7 @@ def test_slopes_find_it_in_four_trials_from_a_touch(power: float, share: float) 
     def hold(grip: float) -> Trial:
         way = (grip + 0.2e-3) / 0.2e-3
         capacity, slope = share * way**power, share * power * way ** (power - 1.0) / 0.2e-3
-        return Trial(ended(capacity >= 1.0), 0.0, 2.0, min(capacity, 1.0), capacity=capacity, slope=slope)
+        return Trial(ended(capacity >= 1.0), 0.0, 2.0, capacity, capacity=capacity, slope=slope)
 
     found = gentlest_grip(hold, 0.0, 5e-3, weight=1.0, friction=0.6, start=1e-3, tolerance=0.03)
     assert found.status is GripStatus.HELD
@@ -162,7 +162,7 @@ def test_what_held_is_returned_when_the_linear_solves_are_spent() -> None:
 def test_trials_have_a_budget() -> None:
     found = gentlest_grip(squeezed(2.0, 0.5), 0.0, 0.05, weight=2.0, friction=0.5, tolerance=1e-6, most=5)
     assert len(found.trials) == 5
-    assert found.status is GripStatus.HELD
+    assert found.status is GripStatus.HELD_SO_FAR
     assert found.trial.held
 
 
@@ -192,3 +192,21 @@ def test_held_only_with_more_than_muscles_have() -> None:
 def test_what_cannot_be_is_refused(low: float, high: float, weight: float, friction: float) -> None:
     with pytest.raises(InputError, match="grip: want"):
         gentlest_grip(squeezed(1.0, 0.5), low, high, weight=weight, friction=friction)
+
+
+def test_what_slid_tells_how_firm_a_grip_has_to_be() -> None:
+    """An object that rides along: capacities are those before the weight comes on, and a grip holds from 1.5 on.
+
+    A trial in which every point slid bore what it could, so that the next grip is aimed at.
+    """
+
+    def hold(grip: float) -> Trial:
+        capacity = (grip / 1e-3) ** 2
+        outcome = TrialOutcome.HELD if capacity >= 1.5 else TrialOutcome.SLIDES
+        borne = capacity / 1.5 if outcome is TrialOutcome.SLIDES else 0.8 * capacity
+        return Trial(outcome, 1.0, capacity, borne, capacity=capacity, pressed=capacity)
+
+    found = gentlest_grip(hold, 0.0, 5e-3, weight=1.0, friction=0.6, start=1e-3, tolerance=0.1)
+    assert found.status is GripStatus.HELD
+    assert 1.5 <= found.trial.capacity <= 1.5 * 1.1
+    assert len(found.trials) <= 4

@@ -29,7 +29,7 @@ def test_overlap_that_contact_left_is_a_status_of_its_own() -> None:
     pressed = SimpleNamespace(
         model=SimpleNamespace(hands=()),
         frames=[SimpleNamespace(frame=frame) for frame in depths],
-        separated=lambda frame: SimpleNamespace(inside={(A, B): deep(depths[frame]), (B, A): deep(1e-4)}),
+        overlaps=lambda frame, deeper: {(A, B): deep(depths[frame]), (B, A): deep(1e-4)},
         most=lambda name: 2e-3,
     )
     (found,) = remaining_overlaps(pressed)  # type: ignore[arg-type]

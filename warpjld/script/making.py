@@ -105,12 +105,17 @@ class Making:
         return replace(cast(self.scene, self.frames, device=self.device), pressed=found.surfaces)
 
     def unsolved(self, found: Simulation) -> InputError:
-        """Error to raise where not all frames were solved."""
+        """Error to raise where not all frames were solved, or a hand does not press or hold as asked."""
+        from warpjld.simulation.report.verdict import SHORT
+
         solved = found.verdict.frames
         kept = "no frame" if solved is None else f"frames {solved[0]:g} to {solved[1]:g}"
-        pressing = self.scene.contact.pressing
+        pressing, what = (
+            self.scene.contact.pressing,
+            "" if found.verdict.status == SHORT else "contact was not solved: ",
+        )
         return located(
-            InputError(f"contact was not solved: {found.verdict.text}; {kept} and all files are in {self.folder}"),
+            InputError(f"{what}{found.verdict.text}; {kept} and all files are in {self.folder}"),
             None if pressing is None else pressing.where,
         )
 

@@ -43,6 +43,9 @@ _STIFFENS = 3.0
 elements of 20 mm that bends by 110° in 12 steps has equilibria up to 86° with 1, and to the end with 4; with 3 it bends
 by 120° in 12 steps, and by 130° in 14."""
 
+_LONGER = 0.25
+"""Part of a load step by which those of a frame may be longer than asked for, rather than twice as many."""
+
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
 
@@ -173,7 +176,7 @@ class FramesRun:
             count = max(count, hand.bones.steps([(hand.bones.angles(at), at) for at in ends], travel))
         for release in (one.release for one in self.grips if one.release is not None):
             if release.over < steps[-1] and since < release.free:
-                count = max(count, math.ceil((steps[-1] - since) / release.step - 1e-9))
+                count = max(count, math.ceil((steps[-1] - since) / release.step - _LONGER))
         return [since + (steps[-1] - since) * (k + 1) / count for k in range(count - 1)] + [steps[-1]]
 
     def save(self, checkpoint: CheckpointFile) -> bool:

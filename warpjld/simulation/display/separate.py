@@ -19,7 +19,7 @@ from warpjld.simulation.bodies.skin_parts import SkinParts
 from warpjld.simulation.display.overlap import Overlap, SurfacePart, overlap_of, self_overlaps
 from warpjld.simulation.display.uncross import SkinCrossings, uncrossed
 
-__all__ = ["SeparatedSurfaces", "VisibleSurface", "separate_surfaces"]
+__all__ = ["SeparatedSurfaces", "VisibleSurface", "overlaps_before", "separate_surfaces"]
 
 _ROUNDS = 3
 """Iterations of moving two surfaces apart in proportion."""
@@ -86,9 +86,7 @@ def separate_surfaces(
         time: Time at which the obstacles are evaluated [frames].
     """
     bodies = {name: _MovingSurface(shown) for name, shown in surfaces.items()}
-    names = list(bodies)
-    pairs = [(one, other) for k, one in enumerate(names) for other in names[k + 1 :]]
-    pairs = [pair for pair in pairs if bodies[pair[0]].near(bodies[pair[1]])]
+    pairs = _near(bodies)
     for body in bodies.values():
         body.uncross()
         body.separate_parts()
@@ -107,6 +105,32 @@ def separate_surfaces(
             body.move_out(body.inside(obstacle, time), 1.0)
     for body in bodies.values():
         body.uncross()
+    return SeparatedSurfaces(
+        {name: body.at for name, body in bodies.items()},
+        {name: body.moved for name, body in bodies.items()},
+        _inside(bodies, pairs, obstacles, time),
+    )
+
+
+def overlaps_before(
+    surfaces: Mapping[str, VisibleSurface], obstacles: Mapping[str, Obstacle], time: float
+) -> dict[tuple[SurfacePart, SurfacePart], Overlap]:
+    """Overlaps before anything is moved, by surface (or part) and by what its vertices are in; arguments as there."""
+    bodies = {name: _MovingSurface(shown) for name, shown in surfaces.items()}
+    return _inside(bodies, _near(bodies), obstacles, time)
+
+
+def _near(bodies: Mapping[str, _MovingSurface]) -> list[tuple[str, str]]:
+    """Names of every two surfaces that are near each other."""
+    names = list(bodies)
+    pairs = [(one, other) for k, one in enumerate(names) for other in names[k + 1 :]]
+    return [pair for pair in pairs if bodies[pair[0]].near(bodies[pair[1]])]
+
+
+def _inside(
+    bodies: Mapping[str, _MovingSurface], pairs: list[tuple[str, str]], obstacles: Mapping[str, Obstacle], time: float
+) -> dict[tuple[SurfacePart, SurfacePart], Overlap]:
+    """Overlaps of pairs of surfaces, of parts of one, and with obstacles."""
     inside: dict[tuple[SurfacePart, SurfacePart], Overlap] = {}
     for one, other in pairs:
         inside[SurfacePart(one), SurfacePart(other)] = bodies[other].containing(bodies[one])
@@ -116,11 +140,7 @@ def separate_surfaces(
         inside |= {(SurfacePart(name, part), SurfacePart(name, other)): found for (part, other), found in parts}
         for solid, obstacle in obstacles.items():
             inside[SurfacePart(name), SurfacePart(solid)] = body.inside(obstacle, time)
-    return SeparatedSurfaces(
-        {name: body.at for name, body in bodies.items()},
-        {name: body.moved for name, body in bodies.items()},
-        inside,
-    )
+    return inside
 
 
 class _MovingSurface:

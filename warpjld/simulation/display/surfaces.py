@@ -13,9 +13,15 @@ from warpjld.grasp import Places
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.surface_offset import element_edge, facet_edge
+from warpjld.simulation.display.overlap import Overlap, SurfacePart
 from warpjld.simulation.display.pressure_map import PressureMap, pressure_map
 from warpjld.simulation.display.refine import RefinedSurface, refine_surface
-from warpjld.simulation.display.separate import SeparatedSurfaces, VisibleSurface, separate_surfaces
+from warpjld.simulation.display.separate import (
+    SeparatedSurfaces,
+    VisibleSurface,
+    overlaps_before,
+    separate_surfaces,
+)
 from warpjld.simulation.display.smooth import SurfaceSmoother
 from warpjld.simulation.display.uncross import SkinCrossings
 from warpjld.simulation.solve.digit_loads import CRUSHING
@@ -99,6 +105,17 @@ class DeformedSurfaces:
     def separated(self, frame: float) -> SeparatedSurfaces:
         """Visible surfaces at a frame after the display correction."""
         return self._surfaces(frame)[1]
+
+    def overlaps(self, frame: float, deeper: Callable[[str], float]) -> dict[tuple[SurfacePart, SurfacePart], Overlap]:
+        """Overlaps at a frame after the display correction; none if no overlap of a surface is deeper than a depth [m]
+        before it, which the correction only makes less."""
+        if frame not in self._latest:
+            moved = self._displacement(frame)
+            assert moved is not None
+            before = overlaps_before(self._visible(frame, moved), self.model.obstacles, frame - self.model.start)
+            if all(found.depth <= deeper(one.surface) for (one, _), found in before.items()):
+                return {}
+        return self.separated(frame).inside
 
     def most(self, name: str) -> float:
         """Largest displacement of a surface's vertices by the display correction [m]."""

@@ -179,7 +179,7 @@ class Bracket:
         before = max(others, key=lambda one: one.grip, default=None)
         if before is not None and last.root > before.root:
             line = (last.grip - before.grip) / (last.root - before.root)
-            return last.grip + min(max((math.sqrt(self.target) - last.root) * line, _SHORTEST * step), _FARTHEST * step)
+            return last.grip + min(max((math.sqrt(self.target) - last.root) * line, _SHORTEST * step), step)
         return last.grip + step
 
 

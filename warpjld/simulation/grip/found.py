@@ -12,7 +12,7 @@ from typing import Any
 from warpjld.fem.hand.muscles import Effort
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.object_body import ObjectBody
-from warpjld.simulation.grip.force import PressedForce
+from warpjld.simulation.grip.force import ForceStatus, PressedForce
 from warpjld.simulation.grip.search import GripStatus, Trial
 from warpjld.simulation.report.table import csv_cell
 from warpjld.simulation.specification import GripSpecification
@@ -24,6 +24,11 @@ _PRESSES = 0.01
 transmits a little to both."""
 _STEPS = 6
 """Load steps in which the weight is handed over and the object comes to rest; searches took 4 to 6."""
+_REACHED = (
+    *(GripStatus.HELD.name, GripStatus.HELD_AT_ONCE.name, GripStatus.HELD_SO_FAR.name),
+    *(ForceStatus.REACHED.name, ForceStatus.UNEVEN.name),
+)
+"""Statuses of grips that are as asked."""
 _COLUMNS = (
     *("actor", "object", "frame", "grip_deg", "outcome", "held", "borne", "force_n", "sliding", "share", "digit"),
     *("chosen", "status"),
@@ -98,6 +103,21 @@ class FoundGrip:
     def interrupted(self) -> bool:
         """Whether Ctrl-C ended the search."""
         return self.status == GripStatus.INTERRUPTED.name
+
+    @property
+    def reached(self) -> bool:
+        """Whether the hand holds, or presses, as asked."""
+        return self.status in _REACHED
+
+    @property
+    def short(self) -> str:
+        """What was not reached, as "LEFT at frame 24: 0.6 of 4 N (thumb 0.2 N, index 0.4 N): …"."""
+        words = self.text
+        if self.request.force is not None:
+            each = ", ".join(f"{name.rpartition('.')[2]} {force:.2g} N" for name, (force, *_) in self.digits.items())
+            why = next((one.value for one in ForceStatus if one.name == self.status), self.text)
+            words = f"{self.force:.2g} of {self.request.force:.3g} N{f' ({each})' if each else ''}: {why}"
+        return f"{self.request.actor} at frame {self.request.first:g}: {words}"
 
     def content(self) -> dict[str, Any]:
         """The result as plain values for JSON."""

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import SensitivityError
 from warpjld.fem.solver.krylov import SolveStatus
 from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.grip.hold import Loaded, WeightTrials
@@ -42,6 +43,9 @@ _ON = 2
 """Successive steps after which it would still have to go so far, for it to count as not held."""
 _WEAK = 0.9
 """Share of the weight that friction must be able to bear with the pressures of an object that slides at every point."""
+_LOST = 2
+"""Attempts at steps that fail while every point slides, from which on the object counts as not held: no friction is
+left to hold it back."""
 _ALL = 1.0 - 1e-9
 """Share of the contact area that slides from which on all of it counts as sliding."""
 _LEFT = 0.01
@@ -74,14 +78,16 @@ class HandTrials(WeightTrials):
         super().__init__(weight, squeeze.budget)
         self.ride = Ride(model, squeeze.history, one.name, weight.tall, squeeze.budget)
         self._known: dict[float, ContactSolution] = {0.0: squeeze.first}
+        self._passed: dict[float, ContactSolution] = {}
         self._failed: dict[float, ContactSolution] = {}
 
     def closed(self, grip: float) -> ContactSolution:
         """State with the joints flexed by the grip and the object where they balance, with its weight borne."""
         if grip in self._known or grip in self._failed:
             return self._known.get(grip) or self._failed[grip]
-        at = max(known for known in self._known if known < grip)
-        here, instants = self._known[at], list[ContactInstant]()
+        begun = self._passed | self._known
+        at = max(known for known in begun if known < grip)
+        here, instants = begun[at], list(begun[at].instants) if at in self._passed else list[ContactInstant]()
         whole = (grip - at) / self.squeeze.steps(at, grip, RIDING)
         part, left = whole, 0.0
         while at < grip:
@@ -98,6 +104,7 @@ class HandTrials(WeightTrials):
             at, here = ahead, done.solution
             instants += here.instants
             left = done.left
+            self._passed[at] = replace(here, instants=(*instants,))
         if self.weight.most(here.last) >= self.hopeless and left > _SETTLED * self.weight.weight:
             here = self._balanced(grip, here, instants)
         self._known[grip] = replace(here, instants=(*instants,) or here.instants)
@@ -121,7 +128,7 @@ class HandTrials(WeightTrials):
         begin = here = self._balanced(grip, closed, []) if grip == 0.0 else closed
         instants, least, on, rests = list[ContactInstant](), 1.0, 0, _RESTS
         before: RideStep | None = None
-        ride.begin()
+        ride.begin(loaded=True)
         for _ in range(_STEPS):
             done = ride.step(here, stays)
             if done is None:
@@ -167,7 +174,7 @@ class HandTrials(WeightTrials):
         if not weight.force(last) > 0.0:
             return TrialOutcome.APART
         slides = weight.sliding(last) >= _ALL
-        if slides and weight.most(last) < _WEAK:
+        if slides and (weight.most(last) < _WEAK or self.ride.failed >= _LOST):
             return TrialOutcome.SLIDES
         if on >= _ON:
             return TrialOutcome.SLIDES if slides else TrialOutcome.GIVES
@@ -177,6 +184,16 @@ class HandTrials(WeightTrials):
         """Share of the weight that friction could bear with the pressures before the weight acts; under it, an object
         that rode along is pressed as hard within a tenth, unless it slips."""
         return self.weight.most(self.closed(grip).last)
+
+    def rate(self, grip: float) -> float | None:
+        """Logarithmic derivative of the contact force before the weight acts, without the medium around the object."""
+        closed = self.closed(grip)
+        if not closed.converged or len(closed.last.touches) < 2 or not self.weight.force(closed.last) > 0.0:
+            return None
+        try:
+            return self.weight.rate(*self.squeeze.tangent(grip, closed))
+        except SensitivityError:
+            return None
 
     def strain(self, grip: float, instant: ContactInstant) -> tuple[float, str]:
         """Largest load share of the hand's muscles, and its digit."""

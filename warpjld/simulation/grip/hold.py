@@ -42,8 +42,8 @@ class WeightTrials(ABC):
         hopeless: Share of the weight that friction must be able to bear with the pressures before the support is
             removed. Not 1: under the weight an object drags the pads along and presses them harder, by a fifth on
             fingertips.
-        lasting: Whether capacities are those before the weight comes on; then what the hand bore before the object
-            slipped does not tell how much more capacity is needed.
+        lasting: Whether capacities are those before the weight comes on; then only a trial in which every point slides
+            tells by what the hand bore how much more capacity is needed.
     """
 
     hopeless, lasting = 0.6, False
@@ -119,6 +119,5 @@ class WeightTrials(ABC):
         slope = None if rate is None else capacity * rate
         loaded, closed = self.lasting or grip in self._after, self.closed(grip)
         pressed = self.weight.force(closed.last) if closed.converged else float("nan")
-        return Trial(
-            outcome, sliding, force, borne, share, who, note, capacity, slope, loaded, pressed, not self.lasting
-        )
+        telling = not self.lasting or outcome is TrialOutcome.SLIDES
+        return Trial(outcome, sliding, force, borne, share, who, note, capacity, slope, loaded, pressed, telling)

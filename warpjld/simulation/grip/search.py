@@ -30,6 +30,8 @@ _SAME = 0.02
 the search ends."""
 _AMPLE = 4.0
 """Ratio of available friction to weight above which more force would not help."""
+_MARGIN = 0.8
+"""Part of the tolerance by which grips are tried above what is needed: just below it they creep, which costs most."""
 _FIRMER = 1.4
 """Least ratio of capacities of a grip that does not hold and the next one, until one holds: what an object that turns
 or rolls out of a grip is short of is not known by its weight. Trials between the two follow."""
@@ -65,8 +67,8 @@ class GripStatus(Enum):
     STANDS = "it stands on something else, and the hand does not hold it"
     LIMIT = "does not hold at the firmest grip that was allowed"
     NO_SOLUTION = "contact could not be solved"
-    EXHAUSTED = "no grip that holds was found with the linear solves allowed"
-    HELD_SO_FAR = "held, but not by the gentlest grip for certain: the linear solves allowed were spent"
+    EXHAUSTED = "no grip that holds was found with the trials and linear solves allowed"
+    HELD_SO_FAR = "held, but not by the gentlest grip for certain: the trials or linear solves allowed were spent"
     INTERRUPTED = "the search was interrupted before a grip was found"
 
 
@@ -87,7 +89,8 @@ class Trial:
         slope: Derivative of the capacity with respect to the grip; None if not known.
         loaded: Whether the pressures are those under the weight.
         pressed: Sum of the normal forces on the object before the weight acted [N]; NaN if not known.
-        telling: Whether ``borne`` tells how much more capacity is needed: not if the trial ended as the object slipped.
+        telling: Whether ``borne`` tells how much more capacity is needed: not if the object slipped out or rolled while
+            points still stuck.
     """
 
     outcome: TrialOutcome
@@ -164,9 +167,8 @@ def gentlest_grip(
         friction: Coulomb's μ between hand and object.
         start: First step above ``low`` without contact; by default a sixteenth of the range.
         tolerance: Tolerance of the smallest grip, relative to the force.
-        most: Most trials; after that the smallest grip that held is returned.
-        exhausted: Whether the linear solves allowed are spent, asked after every trial; then the smallest grip that
-            held is returned, or else the one that came nearest.
+        most: Most trials; after that the smallest grip that held is returned, or else the one that came nearest.
+        exhausted: Whether the linear solves allowed are spent, asked after every trial; with the same consequence.
 
     Returns:
         The grip found; if Ctrl-C ends the search, the trials so far with ``GripStatus.INTERRUPTED``.
@@ -179,7 +181,7 @@ def gentlest_grip(
         raise InputError(f"grip: want a tolerance between 0 and 1, got {tolerance}")
     if not (weight >= 0.0 and np.isfinite(weight) and friction >= 0.0 and np.isfinite(friction)):
         raise InputError(f"grip: want a weight and a friction of 0 or more, got {weight} N and {friction}")
-    search = _Search(hold, Bracket(low, high, 1.0 + 0.5 * tolerance, step), tolerance)
+    search = _Search(hold, Bracket(low, high, 1.0 + _MARGIN * tolerance, step), tolerance)
     needed = weight / friction if friction else np.inf
     try:
         return search.run(needed, most, exhausted)
@@ -193,6 +195,7 @@ class _Search:
     def __init__(self, hold: Callable[[float], Trial], bracket: Bracket, tolerance: float) -> None:
         self._hold, self._bracket, self._tolerance = hold, bracket, tolerance
         self._aim = self._needed = bracket.target
+        self._slid: list[tuple[float, float]] = []
         self.trials: list[tuple[float, Trial]] = []
 
     def run(self, needed: float, most: int, exhausted: Callable[[], bool]) -> Grip:
@@ -211,9 +214,9 @@ class _Search:
                 return self.exhausted()
             ahead = bracket.next()
             if ahead is None or self._narrow():
-                break
+                return self.best(_at_last(self.trials[-1][1]))
             grip = ahead
-        return self.best(_at_last(self.trials[-1][1]))
+        return self.exhausted()
 
     def best(self, otherwise: GripStatus) -> Grip:
         """The smallest grip that held; if none did, the last one tried, with the status ``otherwise``."""
@@ -240,10 +243,24 @@ class _Search:
     def _note(self, grip: float, trial: Trial) -> None:
         if trial.loaded and not any(one.loaded for _, one in self.trials[:-1]):
             self._bracket.distrust()  # earlier capacities are those before the weight acted
-        if trial.telling and not trial.held and 0.0 < trial.borne < 1.0 < trial.able:  # a capacity of 1 is not enough
-            self._needed = self._aim * trial.able / trial.borne
+        if trial.telling and not trial.held and 0.0 < trial.borne < min(1.0, trial.able):
+            self._needed = self._aim * self._enough(trial.able, trial.borne)
         self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
         self._bracket.target = max(self._needed, self._firmer(trial))
+
+    def _enough(self, able: float, borne: float) -> float:
+        """Capacity at which all of the weight would be borne, by a trial that slid and the one before.
+
+        Pressed twice as hard, what slides bears twice as much; as grips also differ in where they press, the share
+        borne is extrapolated once two are known.
+        """
+        self._slid.append((able, borne))
+        out = able / borne
+        if len(self._slid) > 1:
+            (less, lower), (more, higher) = sorted(self._slid)[-2:]
+            if more > less and higher > lower:
+                out = max(out, more + (1.0 - higher) * (more - less) / (higher - lower))
+        return out
 
     def _firmer(self, trial: Trial) -> float:
         """Least capacity to try next after an object slipped, turned or rolled out of a grip; 0 otherwise."""
@@ -255,7 +272,10 @@ class _Search:
         return _FIRMER * below.value if above is None else float(np.sqrt(below.value * above.value))
 
     def _near(self, trial: Trial) -> bool:
-        """Whether the capacity exceeds the target by no more than the tolerance."""
+        """Whether the capacity exceeds the target by no more than the tolerance, or what friction could bear under the
+        weight exceeds the weight by no more: then no grip holds that presses less by more than that."""
+        if trial.borne <= 1.0 + self._tolerance:
+            return True
         return trial.able <= self._needed / self._aim * (1.0 + self._tolerance)
 
     def _narrow(self) -> bool:

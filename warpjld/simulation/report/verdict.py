@@ -17,12 +17,14 @@ from warpjld.simulation.solve.digit_loads import CRUSHING
 if TYPE_CHECKING:
     from warpjld.simulation.solve_result import SolveResult
 
-__all__ = ["CRUSHED", "RELEASED", "ContactVerdict", "verdict_of"]
+__all__ = ["CRUSHED", "RELEASED", "SHORT", "ContactVerdict", "verdict_of"]
 
 CRUSHED = "CRUSHED"
 """Status of a simulation in which flesh is pressed beyond what it bears."""
 RELEASED = "RELEASED"
 """Status of a simulation in which an object is no longer held, and falls."""
+SHORT = "SHORT"
+"""Status of a simulation in which a hand does not press or hold as asked."""
 _PUSHED = 1e-5
 """Displacement from which a free object counts as pushed [m]; without weight it stays in place otherwise."""
 _BEARS = 0.05
@@ -35,7 +37,8 @@ class ContactVerdict:
 
     Attributes:
         status: Name of the solver's status; ``OVERLAP`` if bodies in contact still overlap, ``CRUSHED`` if flesh is
-            pressed beyond what it bears, ``RELEASED`` if an object is no longer held and falls.
+            pressed beyond what it bears, ``RELEASED`` if an object is no longer held and falls, ``SHORT`` if a hand
+            does not press or hold as asked.
         text: Summary in one line.
         lines: One line for each digit in contact.
         suggestions: Suggested changes of the animation.
@@ -60,7 +63,7 @@ class ContactVerdict:
 
     @property
     def failed(self) -> bool:
-        """Whether requested frames are missing or wrong."""
+        """Whether requested frames are missing or wrong, or a force or hold that was asked for is not reached."""
         return self.status not in (SolveStatus.CONVERGED.name, SolveStatus.STOPPED.name, CRUSHED, RELEASED)
 
     def content(self) -> dict[str, Any]:
@@ -124,6 +127,8 @@ def verdict_of(
     elif solved.released is not None:
         status = RELEASED
         text = f"not held: nothing holds {solved.falls[0].listed} from frame {solved.released:g} on"
+    elif short := [one.short for one in solved.grips if not one.reached]:
+        status, text = SHORT, f"not as asked: {'; '.join(short)}"
     elif not rows:
         text = "solved"
     elif lost := _lost(solved):

@@ -78,7 +78,7 @@ def visible_overlap_notes(surfaces: DeformedSurfaces, frame: float) -> list[str]
 def _solved_overlaps(surfaces: DeformedSurfaces, frame: float) -> Iterator[tuple[SurfacePart, SurfacePart, Overlap]]:
     """Overlaps of surfaces that contact solves, with hands divided into parts."""
     hands = {hand.name: hand for hand in surfaces.model.hands}
-    for (one, other), overlap in surfaces.separated(frame).inside.items():
+    for (one, other), overlap in surfaces.overlaps(frame, surfaces.most).items():
         hand = hands.get(one.surface)
         if hand is None:
             yield one, other, overlap

@@ -38,6 +38,7 @@ def solve_onward(
     aitken: bool = False,
     halvings: int | None = None,
     solves: int | None = None,
+    tolerance: float = _TOLERANCE,
 ) -> ContactSolution:
     """Solve equilibria at ascending times from a previous solution, or from rest.
 
@@ -51,6 +52,7 @@ def solve_onward(
         aitken: Whether the paper's loop uses Aitken relaxation.
         halvings: Most halvings of a load step; by default as many as ``press`` allows.
         solves: Most linear solves; by default as many as ``press`` allows.
+        tolerance: Convergence tolerance, residual over the forces in balance.
 
     Returns:
         The solution; its status says whether the last time was reached.
@@ -64,7 +66,7 @@ def solve_onward(
         after=after,
         method=method,
         aitken=aitken,
-        tolerance=_TOLERANCE,
+        tolerance=tolerance,
         guess=lambda before, time, displacement: model.guess(before, time, displacement, history),
         halvings=halvings,
         solves=solves,
@@ -85,6 +87,7 @@ def solve_branch(
     duration: float | None = None,
     halvings: int | None = None,
     solves: int | None = None,
+    tolerance: float = _TOLERANCE,
 ) -> ContactSolution:
     """Solve equilibria along a trial branch; its functions take the branch parameter, 0 … 1.
 
@@ -100,6 +103,7 @@ def solve_branch(
         duration: Duration of the branch [frames]; None: the animation stands still.
         halvings: Most halvings of a load step; a small number gives up early where there may be no equilibrium.
         solves: Most linear solves.
+        tolerance: Convergence tolerance, as in ``solve_onward``.
     """
     begin = after.last.time
     length = steps * _MOMENT if duration is None else duration
@@ -128,4 +132,5 @@ def solve_branch(
         objects[name] = replace(objects[name], other=lambda time: prescribed(share(time)))
     aside = replace(model, hands=tuple(hands.values()), objects=tuple(objects.values()))
     times = [begin + length * (k + 1) / steps for k in range(steps)]
-    return solve_onward(aside, history, after, times, loads=loads, halvings=halvings, solves=solves)
+    bounds = {"halvings": halvings, "solves": solves, "tolerance": tolerance}
+    return solve_onward(aside, history, after, times, loads=loads, **bounds)

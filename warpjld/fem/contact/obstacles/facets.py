@@ -69,6 +69,7 @@ class Facets:
         self.faces = triangles
         self._neighbours = _neighbours(triangles)
         self._mesh: Any = None
+        self._soft, self._groups = np.empty(0, dtype=bool), np.empty((0, 3), dtype=np.int64)
         self.move(points)
 
     def move(self, vertices: Array, normals: Array | None = None) -> None:
@@ -172,7 +173,9 @@ class Facets:
         # pseudonormals: only their direction matters
         self._feature = np.concatenate([flat[:, None], flat[:, None] + flat[other], around[self.faces]], axis=1)
         if normals is None:
-            label = _smooth_corners(self.faces, soft, self._neighbours)
+            if not np.array_equal(soft, self._soft):
+                self._soft, self._groups = soft, _smooth_corners(self.faces, soft, self._neighbours)
+            label = self._groups
             normals = _summed(label.T.ravel(), angles.T[:, :, None] * flat, int(label.max()) + 1)[label]
         length = np.linalg.norm(normals, axis=2, keepdims=True)
         self.corner_normals = np.where(length > 1e-12, normals / np.maximum(length, 1e-12), flat[:, None])
