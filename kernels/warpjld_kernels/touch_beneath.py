@@ -1,40 +1,18 @@
 """Penetration depth of points below the meshes of parts, by bounding volume hierarchies with eight children per node.
 
-The eight boxes of a node, or the eight triangles of a leaf, are tested at once (SIMD). The trees have the layout of
-``warpjld.grasp.triangle_tree``, one per part; their boxes are refitted in every frame.
+The eight boxes of a node, or the eight triangles of a leaf, are tested at once (SIMD).
 """
 
 import warp as wp
 
 from warpjld_kernels.lanes import VECTORISED, prelude
-from warpjld_kernels.triangle_tree import WAITING, WIDTH, Tree
+from warpjld_kernels.touch_normals import KNOW, Normals
+from warpjld_kernels.touch_trees import FRAME, FRAMES, PartTrees
+from warpjld_kernels.triangle_tree import WAITING, WIDTH
 
 wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
 NEARLY = wp.constant(0.5)  # faces up to this share farther than the nearest contribute to the outward direction
-
-
-@wp.struct
-class PartTrees:
-    """The triangles of P parts.
-
-    ``tree`` has one surface per part; the nodes of part k are ``first_node[k]`` to ``first_node[k + 1]`` (exclusive),
-    and ``held`` is the count of children of each node. The other arrays hold, for each leaf, the values of its eight
-    triangles: ``corner``, vertex indices of the three corners; ``units``, unit normals of the corners, in the layout of
-    the tree's corners; ``border``, 0 for corners on the mesh's boundary, else 1; ``thickness`` of the flesh at the
-    corners [m]; ``plain``, the least :func:`smooth_skin` of the corners; ``real``, 0 for padding triangles in a part's
-    last leaf, else 1.
-    """
-
-    tree: Tree
-    first_node: wp.array(dtype=wp.int32)
-    held: wp.array(dtype=wp.int32)
-    corner: wp.array(dtype=wp.int32)
-    units: wp.array(dtype=float)
-    border: wp.array(dtype=float)
-    thickness: wp.array(dtype=float)
-    plain: wp.array(dtype=float)
-    real: wp.array(dtype=float)
 
 
 @wp.struct
@@ -43,7 +21,7 @@ class Beneath:
 
     ``least``: distance of the nearest face [m], negative if no face is in reach or the point is not behind it;
     ``depth`` below the surface [m]; outward ``normal``; ``sure``, the length of the mean normal, a measure of
-    confidence; ``thick``, thickness of the flesh [m]; ``plain``, see :func:`smooth_skin`; ``border``, 0 at the mesh's
+    confidence; ``thick``, thickness of the flesh [m]; ``plain``, see ``Normals``; ``border``, 0 at the mesh's
     boundary.
     """
 
@@ -56,132 +34,57 @@ class Beneath:
     border: float
 
 
-@wp.func_native(
-    f"""
-    const int W = {WIDTH};
-    for (int node = trees.first_node.data[part + 1] - 1; node >= trees.first_node.data[part]; --node) {{
-        const int child = trees.tree.child.data[node];
-        float* box = trees.tree.boxes.data + size_t(node) * 6 * W;
-        for (int slot = 0; slot < trees.held.data[node]; ++slot) {{
-            float low[3] = {{3e38f, 3e38f, 3e38f}}, high[3] = {{-3e38f, -3e38f, -3e38f}};
-            if (child < 0) {{
-                const size_t leaf = -1 - child + slot;
-                const int* corner = trees.corner.data + leaf * 3 * W;
-                float* out = trees.tree.corners.data + leaf * 9 * W;
-                float* unit = trees.units.data + leaf * 9 * W;
-                float* plain = trees.plain.data + leaf * W;
-                for (int l = 0; l < W; ++l) {{
-                    plain[l] = 1.0f;
-                    for (int k = 0; k < 3; ++k) {{
-                        const int v = corner[W * k + l];
-                        plain[l] = plains.data[v] < plain[l] ? plains.data[v] : plain[l];
-                        for (int i = 0; i < 3; ++i) {{
-                            const float x = points.data[v][i];
-                            out[W * (3 * k + i) + l] = x;
-                            unit[W * (3 * k + i) + l] = units.data[v][i];
-                            low[i] = x < low[i] ? x : low[i];
-                            high[i] = x > high[i] ? x : high[i];
-                        }}
-                    }}
-                }}
-            }} else {{
-                const size_t below = child + slot;
-                const float* its = trees.tree.boxes.data + below * 6 * W;
-                for (int l = 0; l < trees.held.data[below]; ++l)
-                    for (int i = 0; i < 3; ++i) {{
-                        low[i] = its[W * i + l] < low[i] ? its[W * i + l] : low[i];
-                        high[i] = its[3 * W + W * i + l] > high[i] ? its[3 * W + W * i + l] : high[i];
-                    }}
-            }}
-            for (int i = 0; i < 3; ++i) {{ box[W * i + slot] = low[i]; box[3 * W + W * i + slot] = high[i]; }}
-        }}
-    }}
-"""
-)
-def fit_tree(
-    trees: PartTrees,
-    part: int,
-    points: wp.array(dtype=wp.vec3),
-    units: wp.array(dtype=wp.vec3),
-    plains: wp.array(dtype=float),
-):
-    """Copy positions and normals of a part's corners into its leaves, and refit its boxes."""
-
-
-@wp.kernel
-def fit_trees(
-    wanted: wp.array(dtype=wp.int32),
-    points: wp.array(dtype=wp.vec3),
-    units: wp.array(dtype=wp.vec3),
-    plains: wp.array(dtype=float),
-    # in and out
-    trees: PartTrees,
-):
-    """Refit the trees of the parts whose ``wanted`` is not 0."""
-    k = wp.tid()
-    if wanted[k] != 0:
-        fit_tree(trees, k, points, units, plains)
-
-
 _Found = wp.types.vector(length=8, dtype=float)
 
-# nearest_of: squared distances of a leaf's triangles from a point, corners relative to it, and barycentric coordinates
-# of the nearest points; away_from: squared distances of the boxes of a node's children
-_NEAREST = f"""
-    const int W = {WIDTH};
-    auto nearest_of = [&](const float* leaf, Floats corner[3][3], Floats weight[3]) {{
-        Floats edge[3][3], normal[3], side[3];
-        for (int k = 0; k < 3; ++k) {{
-            weight[k] = Floats(0.0f);
-            for (int i = 0; i < 3; ++i) corner[k][i] = *(const Stored*)(leaf + W * (3 * k + i)) - point[i];
-        }}
-        for (int k = 0; k < 3; ++k)
-            for (int i = 0; i < 3; ++i) edge[k][i] = corner[(k + 1) % 3][i] - corner[k][i];
-        for (int i = 0; i < 3; ++i) {{
-            const int j = (i + 1) % 3, m = (i + 2) % 3;
-            normal[i] = edge[0][j] * edge[1][m] - edge[0][m] * edge[1][j];
-        }}
-        Floats squared = Floats(3e38f), lateral = Floats(3e38f), lengths = Floats(0.0f);
-        for (int k = 0; k < 3; ++k) {{
-            const Floats* a = corner[k];
-            const Floats* b = corner[(k + 1) % 3];
-            const Floats* e = edge[k];
-            const Floats length = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-            Floats t = -(a[0] * e[0] + a[1] * e[1] + a[2] * e[2]) / HIGHEST(length, Floats(1e-30f));
-            t = LOWEST(HIGHEST(t, Floats(0.0f)), Floats(1.0f));
-            const Floats x = a[0] + t * e[0], y = a[1] + t * e[1], z = a[2] + t * e[2];
-            const Floats to_edge = x * x + y * y + z * z;
-            const auto nearer = to_edge < squared;
-            weight[k] = nearer ? Floats(1.0f) - t : weight[k];
-            weight[(k + 1) % 3] = nearer ? t : weight[(k + 1) % 3];
-            weight[(k + 2) % 3] = nearer ? Floats(0.0f) : weight[(k + 2) % 3];
-            squared = LOWEST(squared, to_edge);
-            // beyond an edge: on the other side of the plane through it and the normal
-            side[k] = normal[0] * (a[1] * b[2] - a[2] * b[1]) + normal[1] * (a[2] * b[0] - a[0] * b[2])
-                + normal[2] * (a[0] * b[1] - a[1] * b[0]);
-            lateral = LOWEST(lateral, side[k]);
-            lengths += length;
-        }}
-        const Floats wide = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
-        const Floats height = corner[0][0] * normal[0] + corner[0][1] * normal[1] + corner[0][2] * normal[2];
-        const Floats inverse = Floats(1.0f) / HIGHEST(wide, Floats(1e-37f));
-        // a degenerate triangle has no interior: its normal is rounding error
-        lateral = wide > 1e-12f * lengths * lengths ? lateral : Floats(-1.0f);
-        const auto above = lateral >= Floats(0.0f);
-        squared = above ? LOWEST(squared, height * height * inverse) : squared;
-        for (int k = 0; k < 3; ++k) weight[(k + 2) % 3] = above ? side[k] * inverse : weight[(k + 2) % 3];
-        return squared;
-    }};
-    auto away_from = [&](const float* box) {{
+# squared_of: squared distances of a leaf's triangles, by their frames, and the nearest points' x and y in these, where
+# wanted; away_from: squared distances of the boxes of a node's children
+_NEAREST = """
+    auto squared_of = [&](const float* frame, Floats* nearest) {
+        Floats at[19], p[3];
+        for (int k = 0; k < 19; ++k) at[k] = *(const Stored*)(frame + W * k);
+        for (int i = 0; i < 3; ++i) p[i] = point[i] - at[i];
+        const Floats x = p[0] * at[3] + p[1] * at[4] + p[2] * at[5], y = p[0] * at[6] + p[1] * at[7] + p[2] * at[8];
+        const Floats z = p[0] * at[9] + p[1] * at[10] + p[2] * at[11], beyond = x - at[12], none = Floats(0.0f);
+        const Floats first = LOWEST(HIGHEST(x, none), at[12]);
+        const Floats along_second = beyond * at[13] + y * at[14], along_third = x * at[16] + y * at[17];
+        const Floats second = LOWEST(HIGHEST(along_second, none), at[15]);
+        const Floats third = LOWEST(HIGHEST(along_third, none), at[18]);
+        const Floats over_second = beyond * at[14] - y * at[13], over_third = y * at[16] - x * at[17];
+        const Floats to_first = (x - first) * (x - first) + y * y;
+        const Floats to_second = (along_second - second) * (along_second - second) + over_second * over_second;
+        const Floats to_third = (along_third - third) * (along_third - third) + over_third * over_third;
+        const auto inside = HIGHEST(-y, HIGHEST(over_second, over_third)) <= none;
+        const Floats to_edge = LOWEST(to_first, LOWEST(to_second, to_third));
+        if (nearest) {
+            const auto by_second = to_second <= to_third;
+            const Floats rest_x = by_second ? at[12] + second * at[13] : third * at[16];
+            const Floats rest_y = by_second ? second * at[14] : third * at[17];
+            const auto by_first = to_first <= to_edge;
+            nearest[0] = inside ? x : (by_first ? first : rest_x);
+            nearest[1] = inside ? y : (by_first ? none : rest_y);
+        }
+        return z * z + (inside ? none : to_edge);
+    };
+    // offsets of these points from the point itself, and the weights of the triangle's corners there
+    auto spread_of = [&](const float* frame, const Floats* nearest, Floats* foot, Floats* weight) {
+        Floats at[22];
+        for (int k = 0; k < 22; ++k) at[k] = *(const Stored*)(frame + W * k);
+        for (int i = 0; i < 3; ++i) foot[i] = at[i] + nearest[0] * at[3 + i] + nearest[1] * at[6 + i] - point[i];
+        const Floats none = Floats(0.0f), one = Floats(1.0f);
+        weight[2] = LOWEST(nearest[1] * at[20], one);
+        weight[1] = LOWEST(HIGHEST((nearest[0] - weight[2] * at[21]) * at[19], none), one - weight[2]);
+        weight[0] = one - weight[1] - weight[2];
+    };
+    auto away_from = [&](const float* box) {
         Floats squared = Floats(0.0f);
-        for (int i = 0; i < 3; ++i) {{
+        for (int i = 0; i < 3; ++i) {
             const Floats below = *(const Stored*)(box + W * i) - point[i];
             const Floats over = point[i] - *(const Stored*)(box + W * (3 + i));
             const Floats gap = HIGHEST(HIGHEST(below, over), Floats(0.0f));
             squared += gap * gap;
-        }}
+        }
         return squared;
-    }};
+    };
 """
 
 
@@ -194,15 +97,38 @@ _NEAREST = f"""
 #define ROOT(x) __builtin_elementwise_sqrt(x)
 #endif
 """
+    + f"""
+    const int W = {WIDTH};
+"""
+    + FRAMES
+    + KNOW
     + _NEAREST
     + f"""
+    auto frame_leaf = [&](size_t leaf) {{
+        for (int base = 0; base < W; base += N)
+            make_frames(trees.tree.corners.data + leaf * 9 * W + base, trees.frames.data + leaf * {FRAME} * W + base);
+        const int* corner = trees.corner.data + leaf * 3 * W;
+        for (int l = 0; l < W; ++l) {{
+            float plain = 1.0f;
+            for (int k = 0; k < 3; ++k) {{
+                const int v = corner[W * k + l];
+                know(v);
+                plain = normals.plain.data[v] < plain ? normals.plain.data[v] : plain;
+                for (int i = 0; i < 3; ++i)
+                    trees.units.data[leaf * 9 * W + W * (3 * k + i) + l] = normals.unit.data[v][i];
+            }}
+            trees.plain.data[leaf * W + l] = plain;
+        }}
+        trees.framed.data[leaf] = 1;
+    }};
     wp::vec_t<8, float> out;
     out[0] = -1.0f;
     // first pass: nearest triangle. Stack entries hold a squared distance (float bits, high word) and a node (low word)
     wp::uint64 stack[{WAITING}];
     int count = 1;
     stack[0] = (wp::uint32)trees.tree.root.data[part];
-    float best = reach * reach, behind = 0.0f, rim = 1.0f;
+    int nearest = -1;
+    float best = reach * reach;
     while (count) {{
         const wp::uint64 next = stack[--count];
         const wp::uint32 bits = next >> 32;
@@ -212,25 +138,14 @@ _NEAREST = f"""
         const int node = (int)(wp::uint32)next;
         if (node < 0) {{
             const size_t leaf = -1 - node;
+            if (!trees.framed.data[leaf]) frame_leaf(leaf);
             for (int base = 0; base < W; base += N) {{
-                Floats corner[3][3], weight[3];
-                const Floats squared = nearest_of(trees.tree.corners.data + leaf * 9 * W + base, corner, weight);
+                const Floats squared = squared_of(trees.frames.data + leaf * {FRAME} * W + base, nullptr);
                 for (unsigned int near = LANES_OF(squared < best); near; near &= near - 1) {{
                     const int l = FIRST_OF(near);
                     if (!(PICK(squared, l) < best)) continue;
                     best = PICK(squared, l);
-                    float foot[3] = {{}}, normal[3] = {{}};
-                    rim = 0.0f;
-                    for (int k = 0; k < 3; ++k) {{
-                        const float w = PICK(weight[k], l);
-                        rim += w * trees.border.data[leaf * 3 * W + W * k + base + l];
-                        for (int i = 0; i < 3; ++i) {{
-                            foot[i] += w * PICK(corner[k][i], l);
-                            normal[i] += w * trees.units.data[leaf * 9 * W + W * (3 * k + i) + base + l];
-                        }}
-                    }}
-                    behind = foot[0] * normal[0] + foot[1] * normal[1] + foot[2] * normal[2];
-                    out[0] = 0.0f;
+                    nearest = (int)(leaf * W) + base + l;
                 }}
             }}
         }} else {{
@@ -250,10 +165,23 @@ _NEAREST = f"""
             }}
         }}
     }}
-    // next to the mesh's boundary the side is uncertain
-    if (out[0] < 0.0f || (behind <= 0.0f && rim >= 0.5f)) {{
-        out[0] = -1.0f;
-        return out;
+    if (nearest < 0) return out;
+    {{
+        const size_t leaf = nearest / W;
+        const int base = (nearest % W) / N * N, l = nearest % W - base;
+        const float* frame = trees.frames.data + leaf * {FRAME} * W + base;
+        Floats place[2], to[3], weight[3];
+        squared_of(frame, place);
+        spread_of(frame, place, to, weight);
+        float normal[3] = {{}}, rim = 0.0f;
+        for (int k = 0; k < 3; ++k) {{
+            const float w = PICK(weight[k], l);
+            rim += w * trees.border.data[leaf * 3 * W + W * k + base + l];
+            for (int i = 0; i < 3; ++i) normal[i] += w * trees.units.data[leaf * 9 * W + W * (3 * k + i) + base + l];
+        }}
+        const float behind = PICK(to[0], l) * normal[0] + PICK(to[1], l) * normal[1] + PICK(to[2], l) * normal[2];
+        // next to the mesh's boundary the side is uncertain
+        if (behind <= 0.0f && rim >= 0.5f) return out;
     }}
     const float least = sqrtf(best), width = nearly * least + narrowest, within = (least + width) * (least + width);
     Floats total = Floats(0.0f), sums[7];
@@ -264,29 +192,23 @@ _NEAREST = f"""
         const int node = (int)(wp::uint32)stack[--count];
         if (node < 0) {{
             const size_t leaf = -1 - node;
+            if (!trees.framed.data[leaf]) frame_leaf(leaf);
             for (int base = 0; base < W; base += N) {{
-                Floats corner[3][3], weight[3];
-                const Floats squared = nearest_of(trees.tree.corners.data + leaf * 9 * W + base, corner, weight);
+                const float* frame = trees.frames.data + leaf * {FRAME} * W + base;
+                Floats place[2], foot[3], weight[3], n[3];
+                const Floats squared = squared_of(frame, place);
                 if (!LANES_OF(squared < within)) continue;
-                Floats u[3], v[3], n[3], foot[3];
-                for (int i = 0; i < 3; ++i) {{
-                    u[i] = corner[1][i] - corner[0][i];
-                    v[i] = corner[2][i] - corner[0][i];
-                    n[i] = foot[i] = Floats(0.0f);
-                }}
+                spread_of(frame, place, foot, weight);
+                for (int i = 0; i < 3; ++i) n[i] = Floats(0.0f);
                 Floats border = Floats(0.0f), thick = Floats(0.0f);
                 for (int k = 0; k < 3; ++k) {{
                     border += weight[k] * *(const Stored*)(trees.border.data + leaf * 3 * W + W * k + base);
                     thick += weight[k] * *(const Stored*)(trees.thickness.data + leaf * 3 * W + W * k + base);
-                    for (int i = 0; i < 3; ++i) {{
-                        foot[i] += weight[k] * corner[k][i];
+                    for (int i = 0; i < 3; ++i)
                         n[i] += weight[k] * *(const Stored*)(trees.units.data + leaf * 9 * W + W * (3 * k + i) + base);
-                    }}
                 }}
-                const Floats x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2];
-                const Floats z = u[0] * v[1] - u[1] * v[0];
                 Floats near = HIGHEST(Floats(1.0f) - (ROOT(squared) - least) / width, Floats(0.0f));
-                near *= near * ROOT(x * x + y * y + z * z) * *(const Stored*)(trees.real.data + leaf * W + base);
+                near *= near * *(const Stored*)(frame + 22 * W) * *(const Stored*)(trees.real.data + leaf * W + base);
                 const Floats length = ROOT(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
                 const Floats unit = near / HIGHEST(length, Floats(1e-20f));
                 total += near;
@@ -318,22 +240,38 @@ _NEAREST = f"""
 """
 )
 def mean_of_near_faces(
-    trees: PartTrees, part: int, point: wp.vec3, reach: float, nearly: float, narrowest: float
+    trees: PartTrees,
+    normals: Normals,
+    points: wp.array(dtype=wp.vec3),
+    part: int,
+    point: wp.vec3,
+    reach: float,
+    nearly: float,
+    narrowest: float,
 ) -> _Found: ...
 
 
 @wp.func
-def beneath(trees: PartTrees, part: int, point: wp.vec3, reach: float, narrowest: float) -> Beneath:
+def beneath(
+    trees: PartTrees,
+    normals: Normals,
+    points: wp.array(dtype=wp.vec3),
+    part: int,
+    point: wp.vec3,
+    reach: float,
+    narrowest: float,
+) -> Beneath:
     """Weighted means over the faces of a part whose distance from a point is close to that of the nearest face.
 
     The closest face alone would make the outward direction discontinuous where another face becomes the closest. In the
     middle of the flesh the directions cancel: the length of their mean is a measure of confidence.
 
     Args:
+        points: Positions of the surface's vertices [m], from which normals are made where they are not known.
         reach: Largest distance of the nearest face [m].
         narrowest: Least width of the distance interval over which weights fall to 0 [m].
     """
-    found = mean_of_near_faces(trees, part, point, reach, NEARLY, narrowest)
+    found = mean_of_near_faces(trees, normals, points, part, point, reach, NEARLY, narrowest)
     out = Beneath()
     out.least = found[0]
     out.depth = found[1]

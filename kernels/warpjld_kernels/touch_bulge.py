@@ -2,19 +2,23 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.touch_normals import Normals, know_normal
+from warpjld_kernels.touch_parts import Parts
+
+wp.set_module_options(VECTORISED)
 
 
 @wp.kernel
 def measure_displaced(
-    # frame: positions before and after, normals of the length of the vertex's area
+    # frame: positions before and after, and distances between them; normals before
     before: wp.array(dtype=wp.vec3),
     points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
-    part: wp.array(dtype=wp.int32),
+    size: wp.array(dtype=float),
+    normals: Normals,
+    parts: Parts,
     # first of the samples that act on every part
     first_sample: wp.array(dtype=wp.int32),
-    give: wp.array(dtype=float),
     # smoothing matrix in CSR layout
     first: wp.array(dtype=wp.int32),
     column: wp.array(dtype=wp.int32),
@@ -26,27 +30,31 @@ def measure_displaced(
 ):
     """Profile of the bulge, max(smoothed |displacement| − |displacement|, 0), which is positive beside the displaced
     region, and volumes; in parts that have samples."""
-    v = wp.tid()
-    k = part[v]
-    ring_out[v] = 0.0
-    if first_sample[k + 1] > first_sample[k]:
+    k = wp.tid()
+    end = wp.where(first_sample[k + 1] > first_sample[k], parts.first_member[k + 1], parts.first_member[k])
+    room = float(0.0)
+    lost = float(0.0)
+    for m in range(parts.first_member[k], end):
+        v = parts.member[m]
         shift = points[v] - before[v]
         around = float(0.0)
         for i in range(first[v], first[v + 1]):
-            u = column[i]
-            around += value[i] * wp.length(points[u] - before[u])
-        ring = wp.max(around - wp.length(shift), 0.0)
-        if give[v] > 0.0 and ring > 0.0:
-            ring_out[v] = ring
-            wp.atomic_add(room_out, k, wp.length(normals[v]) * ring)
-        wp.atomic_add(lost_out, k, -wp.dot(normals[v], shift))
+            around += value[i] * size[column[i]]
+        ring = wp.max(around - size[v], 0.0)
+        ring = wp.where(parts.give[v] > 0.0, ring, 0.0)
+        ring_out[v] = ring
+        if ring > 0.0 or size[v] > 0.0:
+            know_normal(normals, before, v)
+            room += wp.length(normals.normal[v]) * ring
+            lost -= wp.dot(normals.normal[v], shift)
+    room_out[k] = room
+    lost_out[k] = lost
 
 
 @wp.kernel
 def bulge(
-    normals: wp.array(dtype=wp.vec3),
-    part: wp.array(dtype=wp.int32),
-    thickness: wp.array(dtype=float),
+    normals: Normals,
+    parts: Parts,
     most: float,
     ring: wp.array(dtype=float),
     lost: wp.array(dtype=float),
@@ -55,8 +63,10 @@ def bulge(
     points: wp.array(dtype=wp.vec3),
 ):
     """Move vertices along their normals so that the lost volume is restored, by at most ``most`` thicknesses."""
-    v = wp.tid()
-    k = part[v]
-    if ring[v] > 0.0 and room[k] > 0.0:
-        height = wp.clamp(lost[k] / room[k] * ring[v], 0.0, most * thickness[v])
-        points[v] = points[v] + height * wp.normalize(normals[v])
+    k = wp.tid()
+    end = wp.where(room[k] > 0.0, parts.first_member[k + 1], parts.first_member[k])
+    for m in range(parts.first_member[k], end):
+        v = parts.member[m]
+        if ring[v] > 0.0:
+            height = wp.clamp(lost[k] / room[k] * ring[v], 0.0, most * parts.thickness[v])
+            points[v] = points[v] + height * normals.unit[v]

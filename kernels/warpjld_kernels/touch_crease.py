@@ -2,9 +2,11 @@
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})
+from warpjld_kernels.lanes import VECTORISED
 
-ROOM = wp.constant(0.25)  # margin, in thicknesses, within which vertices before the plane are considered too
+wp.set_module_options({**VECTORISED, "max_unroll": 3})
+
+ROOM = 0.25  # margin, in thicknesses, within which vertices before the plane are considered too
 
 
 @wp.struct
@@ -28,11 +30,11 @@ class Creases:
 
 
 @wp.func
-def across(creases: Creases, entry: int, frame: int, points: wp.array2d(dtype=wp.vec3)) -> wp.vec3:
+def across(creases: Creases, entry: int, points: wp.array(dtype=wp.vec3)) -> wp.vec3:
     """The point opposite to a vertex: weighted mean of three vertices of the other side [m]."""
     out = wp.vec3(0.0, 0.0, 0.0)
     for k in range(3):
-        out += creases.share[entry][k] * points[frame, creases.opposite[entry][k]]
+        out += creases.share[entry][k] * points[creases.opposite[entry][k]]
     return out
 
 
@@ -44,60 +46,112 @@ def counts(creases: Creases, entry: int, r: wp.vec3, n: wp.vec3) -> float:
     return creases.weight[entry] * wp.clamp(2.0 - 2.0 * beside, 0.0, 1.0)
 
 
+@wp.func_native(f"""
+    const float* at = (const float*)points.data;
+    int count = 0;
+    for (int row = 0; row < creases.vertex.shape[0]; ++row) {{
+        const int v = creases.vertex.data[row];
+        const float* p = at + 3 * size_t(v);
+        float most = 0.0f;
+        bool is_near = false;
+        for (int entry = creases.first.data[row]; entry < creases.first.data[row + 1]; ++entry) {{
+            const int j = creases.crease.data[entry];
+            if (bent.data[j] == 0.0f) continue;
+            float r[3] = {{p[0], p[1], p[2]}};
+            for (int k = 0; k < 3; ++k) {{
+                const float* q = at + 3 * size_t(creases.opposite.data[entry][k]);
+                const float part = creases.share.data[entry][k];
+                for (int i = 0; i < 3; ++i) r[i] -= part * q[i];
+            }}
+            const wp::vec3& n = normal.data[j];
+            const float along = r[0] * n[0] + r[1] * n[1] + r[2] * n[2], height = creases.height.data[entry];
+            const float size = creases.size.data[j];
+            float overlap = height < 0.0f ? along : -along;
+            is_near |= -overlap < 2.0f * kept * fabsf(height) + {ROOM}f * size;
+            if (overlap > 0.0f) {{
+                const float aside = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] - along * along;
+                const float facing = 2.0f - 2.0f * sqrtf(aside > 0.0f ? aside : 0.0f) / size;
+                const float bounded = facing < 0.0f ? 0.0f : (facing > 1.0f ? 1.0f : facing);
+                overlap *= bent.data[j] * creases.weight.data[entry] * bounded;
+                most = overlap > most ? overlap : most;
+                const float ratio = overlap / (2.0f * share * size);
+                deepest.data[j] = ratio > deepest.data[j] ? ratio : deepest.data[j];
+            }}
+        }}
+        if (is_near) near.data[count++] = row;
+        overlaps.data[v] = most;
+    }}
+    return count;
+""")
+def overlaps_at_creases(
+    creases: Creases,
+    normal: wp.array(dtype=wp.vec3),
+    bent: wp.array(dtype=float),
+    points: wp.array(dtype=wp.vec3),
+    share: float,
+    kept: float,
+    near: wp.array(dtype=wp.int32),
+    overlaps: wp.array(dtype=float),
+    deepest: wp.array(dtype=float),
+) -> int:
+    """As :func:`measure_creases`; returns the number of rows in ``near``."""
+
+
 @wp.kernel
 def measure_creases(
     creases: Creases,
-    # normals of the planes in every frame, and their weights, 0 for joints that are hardly bent
-    normal: wp.array2d(dtype=wp.vec3),
-    bent: wp.array2d(dtype=float),
-    points: wp.array2d(dtype=wp.vec3),
+    # normals of the planes, and their weights, 0 for joints that are hardly bent
+    normal: wp.array(dtype=wp.vec3),
+    bent: wp.array(dtype=float),
+    points: wp.array(dtype=wp.vec3),
     share: float,
     kept: float,
     # out: number and rows of the vertices that may have to be pushed, with a margin for the effect of pushing others;
     # the overlap of every vertex with the opposite side [m]; and the largest overlap at every plane, relative to what
-    # both sides can yield
+    # both sides can yield, zeros before
     count_out: wp.array(dtype=wp.int32),
-    near_out: wp.array2d(dtype=wp.int32),
-    overlap_out: wp.array2d(dtype=float),
-    deepest_out: wp.array2d(dtype=float),
+    near_out: wp.array(dtype=wp.int32),
+    overlap_out: wp.array(dtype=float),
+    deepest_out: wp.array(dtype=float),
 ):
-    """Overlap of every vertex with the opposite side of its joints."""
-    frame, row = wp.tid()
-    v = creases.vertex[row]
-    most = float(0.0)
-    near = int(0)
-    for entry in range(creases.first[row], creases.first[row + 1]):
-        j = creases.crease[entry]
-        if bent[frame, j] == 0.0:
-            continue
-        n = normal[frame, j]
-        r = points[frame, v] - across(creases, entry, frame, points)
-        overlap = -wp.sign(creases.height[entry]) * wp.dot(r, n)
-        if -overlap < 2.0 * kept * wp.abs(creases.height[entry]) + ROOM * creases.size[j]:
-            near = 1
-        if overlap > 0.0:
-            overlap *= bent[frame, j] * counts(creases, entry, r, n)
-            most = wp.max(most, overlap)
-            wp.atomic_max(deepest_out, frame, j, overlap / (2.0 * share * creases.size[j]))
-    if near == 1:
-        near_out[frame, wp.atomic_add(count_out, frame, 1)] = row
-    overlap_out[frame, v] = most
+    """Overlap of every vertex with the opposite side of its joints: one thread."""
+    count_out[0] = overlaps_at_creases(creases, normal, bent, points, share, kept, near_out, overlap_out, deepest_out)
+
+
+@wp.kernel
+def smooth_overlaps(
+    creases: Creases,
+    count: wp.array(dtype=wp.int32),
+    near: wp.array(dtype=wp.int32),
+    overlap: wp.array(dtype=float),
+    # smoothing matrix in CSR layout
+    row_first: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=float),
+    # out
+    smoothed_out: wp.array(dtype=float),
+):
+    """Smoothed overlap of the vertices that may have to be pushed, by row: one thread."""
+    for n in range(count[0]):
+        row = near[n]
+        v = creases.vertex[row]
+        around = float(0.0)
+        for i in range(row_first[v], row_first[v + 1]):
+            around += value[i] * overlap[column[i]]
+        smoothed_out[row] = around
 
 
 @wp.kernel
 def push_creases(
     creases: Creases,
-    normal: wp.array2d(dtype=wp.vec3),
-    bent: wp.array2d(dtype=float),
-    points: wp.array2d(dtype=wp.vec3),
+    normal: wp.array(dtype=wp.vec3),
+    bent: wp.array(dtype=float),
+    points: wp.array(dtype=wp.vec3),
     count: wp.array(dtype=wp.int32),
-    near: wp.array2d(dtype=wp.int32),
-    overlap: wp.array2d(dtype=float),
-    deepest: wp.array2d(dtype=float),
-    # smoothing matrix in CSR layout
-    row_first: wp.array(dtype=wp.int32),
-    column: wp.array(dtype=wp.int32),
-    value: wp.array(dtype=float),
+    near: wp.array(dtype=wp.int32),
+    deepest: wp.array(dtype=float),
+    # the overlap smoothed, by row
+    smoothed: wp.array(dtype=float),
     kept: float,
     least: float,
     wider: float,
@@ -105,66 +159,61 @@ def push_creases(
     full: float,
     none: float,
     # out
-    shift_out: wp.array2d(dtype=wp.vec3),
+    shift_out: wp.array(dtype=wp.vec3),
 ):
     """Displacement of every vertex that may have to be pushed away from its opposite point, half of the separation
     needed.
 
     The separation aimed at is a small distance plus a multiple of the smoothed overlap, but no more than a share of the
-    distance at rest.
+    distance at rest. One thread.
     """
-    frame = wp.tid()
-    for n in range(count[frame]):
-        row = near[frame, n]
+    for n in range(count[0]):
+        row = near[n]
         v = creases.vertex[row]
-        p = points[frame, v]
-        around = float(0.0)
-        for i in range(row_first[v], row_first[v + 1]):
-            around += value[i] * overlap[frame, column[i]]
+        p = points[v]
         shift = wp.vec3(0.0, 0.0, 0.0)
         for entry in range(creases.first[row], creases.first[row + 1]):
             j = creases.crease[entry]
-            if bent[frame, j] == 0.0:
+            if bent[j] == 0.0:
                 continue
-            towards = normal[frame, j]
-            r = p - across(creases, entry, frame, points)
+            towards = normal[j]
+            r = p - across(creases, entry, points)
             side = wp.sign(creases.height[entry])
-            apart = 2.0 * least * creases.size[j] + wp.min(wider * around, widest * creases.size[j])
+            apart = 2.0 * least * creases.size[j] + wp.min(wider * smoothed[row], widest * creases.size[j])
             apart = wp.min(apart, 2.0 * kept * wp.abs(creases.height[entry]))
             missing = apart - side * wp.dot(r + shift, towards)
             if missing > 0.0:
-                shown = bent[frame, j] * wp.clamp((none - deepest[frame, j]) / (none - full), 0.0, 1.0)
+                shown = bent[j] * wp.clamp((none - deepest[j]) / (none - full), 0.0, 1.0)
                 shift += 0.5 * shown * counts(creases, entry, r, towards) * missing * side * towards
-        shift_out[frame, row] = shift
+        shift_out[row] = shift
 
 
 @wp.kernel
 def move_smoothly(
     creases: Creases,
     count: wp.array(dtype=wp.int32),
-    near: wp.array2d(dtype=wp.int32),
-    shift: wp.array2d(dtype=wp.vec3),
+    near: wp.array(dtype=wp.int32),
+    shift: wp.array(dtype=wp.vec3),
     # transposed smoothing matrix in CSR layout
     row_first: wp.array(dtype=wp.int32),
     column: wp.array(dtype=wp.int32),
     value: wp.array(dtype=float),
     # zeros, and zeros again afterwards
-    total: wp.array2d(dtype=wp.vec3),
+    total: wp.array(dtype=wp.vec3),
     # in and out
-    points: wp.array2d(dtype=wp.vec3),
+    points: wp.array(dtype=wp.vec3),
 ):
-    """Add smoothed shifts; vertices without one keep their exact values."""
-    frame = wp.tid()
-    for n in range(count[frame]):
-        row = near[frame, n]
-        if wp.length_sq(shift[frame, row]) > 0.0:
+    """Add smoothed shifts; vertices without one keep their exact values. One thread."""
+    for n in range(count[0]):
+        row = near[n]
+        if wp.length_sq(shift[row]) > 0.0:
             v = creases.vertex[row]
             for i in range(row_first[v], row_first[v + 1]):
-                total[frame, column[i]] = total[frame, column[i]] + value[i] * shift[frame, row]
-    for n in range(count[frame]):
-        row = near[frame, n]
-        if wp.length_sq(shift[frame, row]) > 0.0:
+                total[column[i]] = total[column[i]] + value[i] * shift[row]
+    for n in range(count[0]):
+        row = near[n]
+        if wp.length_sq(shift[row]) > 0.0:
             v = creases.vertex[row]
             for i in range(row_first[v], row_first[v + 1]):
-                points[frame, column[i]] = points[frame, column[i]] + total[frame, column[i]]
-                total[frame, column[i]] = wp.vec3(0.0, 0.0, 0.0)
+                points[column[i]] = points[column[i]] + total[column[i]]
+                total[column[i]] = wp.vec3(0.0, 0.0, 0.0)

@@ -3,6 +3,7 @@
 import warp as wp
 
 from warpjld_kernels.lanes import VECTORISED, prelude
+from warpjld_kernels.touch_normals import Normals, know_normal
 from warpjld_kernels.touch_parts import FAR, Parts
 from warpjld_kernels.touch_samples import Samples
 
@@ -164,7 +165,7 @@ def next_near(assigned: Assigned, point: wp.vec3, begin: int, end: int) -> int:
 def part_surfaces(
     # frame
     points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
+    normals: Normals,
     samples: Samples,
     # by pairs of parts: share of their overlap that is separated
     shown: wp.array2d(dtype=float),
@@ -183,63 +184,76 @@ def part_surfaces(
 
     n towards the side the vertex is on, m a sample's point, c a clearance, w its weight times a kernel of its radius.
     """
-    v = wp.tid()
-    p = points[v]
-    own = parts.part[v]
+    own = wp.tid()
     low = assigned.lower[own]
     high = assigned.upper[own]
-    d = wp.vec3(0.0, 0.0, 0.0)
-    outside = p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]
-    if not outside and parts.give[v] > 0.0:
-        facing = wp.normalize(normals[v])
-        matrix = wp.mat33(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        right = wp.vec3(0.0, 0.0, 0.0)
-        last = assigned.last[own]
-        k = next_near(assigned, p, assigned.first[own], last)
-        while k < last:
-            i = assigned.sample[k]
-            k = next_near(assigned, p, k + 1, last)
-            r = p - samples.point[i]
-            near = 1.0 - wp.length_sq(r) / (samples.radius[i] * samples.radius[i])
-            if near > 0.0:
-                side = float(0.0)
-                # +1 on the side of the sample's own part, −1 on that of the part it lies inside
-                if parts.apart[own, samples.own[i]] == 2 and own != samples.other[i]:
-                    side = 1.0
-                elif parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
-                    side = -1.0
-                # a part next to both: the side is the one its normal points away from, undecided where tangential
-                sure = float(1.0)
-                if side == 1.0 and parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
-                    away = wp.dot(facing, samples.normal[i])
-                    side = wp.where(away < 0.0, 1.0, -1.0)
-                    sure = wp.min(4.0 * wp.abs(away), 1.0)
-                n = side * samples.normal[i]
-                limit = samples.depth[i] / samples.ratio[i]
-                # limited to a little more than the sample's own depth
-                gap = clearance * limit * wp.sqrt(samples.counts[i])
-                missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.parted[i])
-                looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
-                if side != 0.0 and missing > 0.0 and looks > 0.0:
-                    # the weight of a plane grows from zero as it is passed, so that displacements are continuous
-                    passing = wp.min(missing / (soft * limit), 1.0)
-                    # pairs that are not separated have no weight either
-                    share = shown[samples.own[i], samples.other[i]]
-                    weight = near * near * sure * looks * passing * samples.counts[i] * wp.min(HOLDS * share, 1.0)
-                    matrix += weight * wp.outer(n, n)
-                    right += weight * share * missing * n
-        matrix += stiffness * wp.identity(n=3, dtype=float)
-        d = wp.inverse(matrix) * right
-    moved_out[v] = d
+    end = wp.where(assigned.last[own] > assigned.first[own], parts.first_member[own + 1], parts.first_member[own])
+    for m in range(parts.first_member[own], end):
+        v = parts.member[m]
+        p = points[v]
+        d = wp.vec3(0.0, 0.0, 0.0)
+        outside = wp.min(p - low) < 0.0 or wp.min(high - p) < 0.0
+        if not outside and parts.give[v] > 0.0:
+            matrix = wp.mat33(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            right = wp.vec3(0.0, 0.0, 0.0)
+            last = assigned.last[own]
+            k = next_near(assigned, p, assigned.first[own], last)
+            if k < last:
+                know_normal(normals, points, v)
+            facing = normals.unit[v]
+            while k < last:
+                i = assigned.sample[k]
+                k = next_near(assigned, p, k + 1, last)
+                r = p - samples.point[i]
+                near = 1.0 - wp.length_sq(r) / (samples.radius[i] * samples.radius[i])
+                if near > 0.0:
+                    side = float(0.0)
+                    # +1 on the side of the sample's own part, −1 on that of the part it lies inside
+                    if parts.apart[own, samples.own[i]] == 2 and own != samples.other[i]:
+                        side = 1.0
+                    elif parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
+                        side = -1.0
+                    # a part next to both: the side is the one its normal points away from, undecided where tangential
+                    sure = float(1.0)
+                    if side == 1.0 and parts.apart[own, samples.other[i]] == 2 and own != samples.own[i]:
+                        away = wp.dot(facing, samples.normal[i])
+                        side = wp.where(away < 0.0, 1.0, -1.0)
+                        sure = wp.min(4.0 * wp.abs(away), 1.0)
+                    n = side * samples.normal[i]
+                    limit = samples.depth[i] / samples.ratio[i]
+                    # limited to a little more than the sample's own depth
+                    gap = clearance * limit * wp.sqrt(samples.counts[i])
+                    missing = wp.min(gap - wp.dot(r, n), gap + 1.5 * samples.parted[i])
+                    looks = wp.clamp(1.0 - 2.0 * wp.dot(facing, n), 0.0, 1.0)
+                    if side != 0.0 and missing > 0.0 and looks > 0.0:
+                        # the weight of a plane grows from zero as it is passed, so that displacements are continuous
+                        passing = wp.min(missing / (soft * limit), 1.0)
+                        # pairs that are not separated have no weight either
+                        share = shown[samples.own[i], samples.other[i]]
+                        weight = near * near * sure * looks * passing * samples.counts[i] * wp.min(HOLDS * share, 1.0)
+                        matrix += weight * wp.outer(n, n)
+                        right += weight * share * missing * n
+            matrix += stiffness * wp.identity(n=3, dtype=float)
+            d = wp.inverse(matrix) * right
+        moved_out[v] = d
 
 
 @wp.kernel
 def move(
+    before: wp.array(dtype=wp.vec3),
     moved: wp.array(dtype=wp.vec3),
+    assigned: Assigned,
+    parts: Parts,
     # in and out
     points: wp.array(dtype=wp.vec3),
+    # out: distance of every vertex from where it was before any displacement [m]
+    size_out: wp.array(dtype=float),
 ):
-    """Add displacements; vertices without one keep their exact values."""
-    v = wp.tid()
-    if wp.length_sq(moved[v]) > 0.0:
-        points[v] = points[v] + moved[v]
+    """Add displacements of parts that have samples; vertices without one keep their exact values."""
+    own = wp.tid()
+    some = assigned.last[own] > assigned.first[own]
+    for m in range(parts.first_member[own], parts.first_member[own + 1]):
+        v = parts.member[m]
+        if some and wp.length_sq(moved[v]) > 0.0:
+            points[v] = points[v] + moved[v]
+        size_out[v] = wp.length(points[v] - before[v])

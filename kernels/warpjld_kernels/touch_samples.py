@@ -3,8 +3,10 @@
 import warp as wp
 
 from warpjld_kernels.lanes import VECTORISED
-from warpjld_kernels.touch_beneath import PartTrees, beneath
-from warpjld_kernels.touch_parts import BESIDE, FAR, Parts
+from warpjld_kernels.touch_beneath import beneath
+from warpjld_kernels.touch_normals import Normals, know_normal
+from warpjld_kernels.touch_parts import BESIDE, FAR, Bounds, Parts, within
+from warpjld_kernels.touch_trees import PartTrees
 
 wp.set_module_options({**VECTORISED, "max_unroll": 1})
 
@@ -55,8 +57,11 @@ def beside_bones(joints: wp.array(dtype=wp.vec3), parts: Parts, k: int, p: wp.ve
 
 @wp.kernel
 def find_samples(
-    # vertices that are tested, and weight of their samples by pairs of parts; at weight 0 they are not tested
-    vertices: wp.array(dtype=wp.int32),
+    # vertices that are tested, those of one group, and weight of their samples by pairs of parts; at weight 0 they are
+    # not tested
+    candidate: wp.array2d(dtype=wp.int32),
+    number: wp.array(dtype=wp.int32),
+    group: int,
     pair_weight: wp.array2d(dtype=float),
     # nearest probe of every vertex, tested before, and by pairs of parts the depth of a probe above which the vertex is
     # tested even at weight 0, so that the deepest one is found
@@ -64,17 +69,12 @@ def find_samples(
     deep_enough: wp.array2d(dtype=float),
     # frame
     points: wp.array(dtype=wp.vec3),
-    units: wp.array(dtype=wp.vec3),
-    plains: wp.array(dtype=float),
+    normals: Normals,
     trees: PartTrees,
-    lower: wp.array(dtype=wp.vec3),
-    upper: wp.array(dtype=wp.vec3),
+    bounds: Bounds,
     count: wp.array(dtype=wp.int32),
     others: wp.array2d(dtype=wp.int32),
     joints: wp.array(dtype=wp.vec3),
-    # boxes outside which vertices of every part are not tested
-    within_lower: wp.array(dtype=wp.vec3),
-    within_upper: wp.array(dtype=wp.vec3),
     # surface
     parts: Parts,
     share: float,
@@ -88,62 +88,54 @@ def find_samples(
     """Find vertices inside the mesh of another part: behind the interpolated normal at the closest point.
 
     Surfaces with the same orientation are not in contact, nor are points whose closest point lies on the boundary of a
-    mesh, where it is open.
+    mesh, where it is open. One thread.
     """
-    v = vertices[wp.tid()]
-    p = points[v]
-    own = parts.part[v]
-    tested = count[own]
-    around = ratio_out[beside[v]]
-    deep = float(0.0)
-    if tested > 0:
-        low = within_lower[own]
-        high = within_upper[own]
-        if p[0] < low[0] or p[1] < low[1] or p[2] < low[2] or p[0] > high[0] or p[1] > high[1] or p[2] > high[2]:
-            tested = 0
-    looks = units[v]
-    for i in range(tested):
-        k = others[own, i]
-        low = lower[k]
-        high = upper[k]
-        # points beneath the open end of a mesh may be outside its box: fade out, for continuity
-        beyond = wp.length(wp.max(wp.max(low - p, p - high), wp.vec3(0.0, 0.0, 0.0)))
-        near = 1.0 - beyond / wp.max(BESIDE * parts.around[k], 1.0e-30)
-        if near > 0.0 and (pair_weight[own, k] > 0.0 or around > deep_enough[own, k]):
-            near *= beside_bones(joints, parts, k, p)
-        if near > 0.0 and (pair_weight[own, k] > 0.0 or around > deep_enough[own, k]):
-            reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
-            over = beneath(trees, k, p, reach, 1.0e-3 * parts.around[k] + 1.0e-9)
-            least = over.least
-            if least >= 0.0:
-                near *= wp.min(5.0 - 5.0 * least / reach, 1.0)
-                if over.depth > 0.0:
-                    n = over.normal
-                    sure = wp.clamp((over.sure - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
-                    facing = wp.clamp(-2.0 * wp.dot(n, looks), parts.facing, 1.0)
-                    plain = wp.min(plains[v], over.plain)
-                    inside = near * wp.min(over.depth, least) * plain * over.border
-                    depth = inside * facing - parts.at_rest[v]
-                    parted = wp.max(inside * facing * sure - parts.at_rest[v], 0.0)
-                    limit = share * wp.min(over.thick, parts.thickness[v])
-                    # regardless of orientation, and larger where the outward direction is uncertain
-                    if inside > parts.at_rest[v]:
-                        ratio = (inside - parts.at_rest[v]) / limit
-                        ratio += (1.0 - sure) * none * wp.min(ratio, 1.0)
-                        deep = wp.max(deep, ratio)
-                        wp.atomic_max(deepest_out, own, k, ratio)
-                    if depth > 0.0:
-                        yields = parts.give[v] / wp.max(parts.give[v] + parts.give_of[k], 1.0e-12)
-                        at = wp.atomic_add(samples.count, 0, 1)
-                        if at < samples.vertex.shape[0]:
-                            samples.vertex[at] = v
-                            samples.own[at] = own
-                            samples.other[at] = k
-                            samples.point[at] = p + yields * parted * n
-                            samples.normal[at] = n
-                            samples.depth[at] = depth
-                            samples.parted[at] = parted
-                            samples.counts[at] = pair_weight[own, k] * wp.min(parted / (soft * limit), 1.0)
-                            samples.radius[at] = wp.max(wp.min(over.thick, parts.thickness[v]), 1.2 * parts.edge[v])
-                            samples.ratio[at] = depth / limit
-    ratio_out[v] = deep
+    for c in range(number[group]):
+        v = candidate[group, c]
+        p = points[v]
+        own = parts.part[v]
+        around = ratio_out[beside[v]]
+        deep = float(0.0)
+        for i in range(count[own]):
+            k = others[own, i]
+            # points beneath the open end of a mesh may be outside its bounds: fade out, for continuity
+            near = within(bounds, k, p, BESIDE * parts.around[k])
+            if near > 0.0 and (pair_weight[own, k] > 0.0 or around > deep_enough[own, k]):
+                near *= beside_bones(joints, parts, k, p)
+            if near > 0.0 and (pair_weight[own, k] > 0.0 or around > deep_enough[own, k]):
+                reach = wp.max(2.0 * parts.thickness[v], parts.around[k])
+                over = beneath(trees, normals, points, k, p, reach, 1.0e-3 * parts.around[k] + 1.0e-9)
+                least = over.least
+                if least >= 0.0:
+                    near *= wp.min(5.0 - 5.0 * least / reach, 1.0)
+                    if over.depth > 0.0:
+                        know_normal(normals, points, v)
+                        n = over.normal
+                        sure = wp.clamp((over.sure - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
+                        facing = wp.clamp(-2.0 * wp.dot(n, normals.unit[v]), parts.facing, 1.0)
+                        plain = wp.min(normals.plain[v], over.plain)
+                        inside = near * wp.min(over.depth, least) * plain * over.border
+                        depth = inside * facing - parts.at_rest[v]
+                        parted = wp.max(inside * facing * sure - parts.at_rest[v], 0.0)
+                        limit = share * wp.min(over.thick, parts.thickness[v])
+                        # regardless of orientation, and larger where the outward direction is uncertain
+                        if inside > parts.at_rest[v]:
+                            ratio = (inside - parts.at_rest[v]) / limit
+                            ratio += (1.0 - sure) * none * wp.min(ratio, 1.0)
+                            deep = wp.max(deep, ratio)
+                            wp.atomic_max(deepest_out, own, k, ratio)
+                        if depth > 0.0:
+                            yields = parts.give[v] / wp.max(parts.give[v] + parts.give_of[k], 1.0e-12)
+                            at = wp.atomic_add(samples.count, 0, 1)
+                            if at < samples.vertex.shape[0]:
+                                samples.vertex[at] = v
+                                samples.own[at] = own
+                                samples.other[at] = k
+                                samples.point[at] = p + yields * parted * n
+                                samples.normal[at] = n
+                                samples.depth[at] = depth
+                                samples.parted[at] = parted
+                                samples.counts[at] = pair_weight[own, k] * wp.min(parted / (soft * limit), 1.0)
+                                samples.radius[at] = wp.max(wp.min(over.thick, parts.thickness[v]), 1.2 * parts.edge[v])
+                                samples.ratio[at] = depth / limit
+        ratio_out[v] = deep

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from warpjld.geometry.normals import vertex_normals
-from warpjld.touch.host_arrays import vectors
+from warpjld.touch.host_arrays import floats, numbers, vectors
+from warpjld.touch.part_arrays import normal_arrays
 from warpjld.touch.part_trees import part_trees
 
 REACH, NARROWEST = 0.8, 1e-3
@@ -40,17 +41,18 @@ def nearest_weights(point: NDArray[np.float64], corners: NDArray[np.float64]) ->
 
 def test_means_over_near_faces_are_those_of_all_faces_measured_one_by_one() -> None:
     import warp as wp
-    from warpjld_kernels import touch_beneath
+    from warpjld_kernels import touch_beneath, touch_trees
 
     @wp.kernel(module="unique")
     def measure(
         trees: touch_beneath.PartTrees,
+        skin: touch_beneath.Normals,
         part: int,
         points: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
         out: wp.array2d(dtype=float),  # type: ignore[valid-type]
     ) -> None:
         i = wp.tid()
-        found = touch_beneath.beneath(trees, part, points[i], REACH, NARROWEST)
+        found = touch_beneath.beneath(trees, skin, points, part, points[i], REACH, NARROWEST)
         mean = found.sure * found.normal
         out[i, 0] = found.least
         out[i, 1] = found.depth
@@ -67,15 +69,18 @@ def test_means_over_near_faces_are_those_of_all_faces_measured_one_by_one() -> N
     trees = part_trees(vertices, list(zip(meshes, border, strict=True)), thickness)
     normals = vertex_normals(vertices, np.concatenate(meshes))
     wanted = wp.array([1, 1], dtype=wp.int32, device="cpu")
-    plain = wp.array(np.ones(len(vertices), dtype=np.float32), device="cpu")
-    wp.launch(
-        touch_beneath.fit_trees, 2, inputs=[wanted, vectors(vertices), vectors(normals), plain, trees], device="cpu"
+    skin = normal_arrays(vertices, np.concatenate(meshes))
+    skin.unit, skin.plain, skin.known = (
+        vectors(normals),
+        floats(np.ones(len(vertices))),
+        numbers(np.ones(len(vertices))),
     )
+    wp.launch(touch_trees.fit_trees, 2, inputs=[wanted, vectors(vertices), trees], device="cpu")
     seen = 0
     for part, faces in enumerate(meshes):
         points = random.normal(0.0, 0.45, (40, 3)) + np.array([2.5 * part, 0.0, 0.0])
         out = wp.zeros((len(points), 7), dtype=float, device="cpu")
-        wp.launch(measure, len(points), inputs=[trees, part, vectors(points), out], device="cpu")
+        wp.launch(measure, len(points), inputs=[trees, skin, part, vectors(points), out], device="cpu")
         for point, got in zip(points, out.numpy(), strict=True):
             expected = one_by_one(point, vertices, faces, normals, border[part], thickness)
             if expected is None:

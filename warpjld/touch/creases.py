@@ -15,13 +15,14 @@ from warpjld.geometry.rotations import rotate, unit
 from warpjld.geometry.segment_distance import segment_distance
 from warpjld.skeleton.kinematics import Poses
 from warpjld.touch.frame import FULL, NONE, SHARE
+from warpjld.touch.host_arrays import recorded
 from warpjld.touch.patches import Patches
 from warpjld.touch.smoothing import edge_lengths, skin_smoothing
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
 
-__all__ = ["Creases"]
+__all__ = ["CreaseBench", "Creases"]
 
 _KEPT = 0.25
 """Share of its rest distance from the plane that a vertex is kept away from it at most. At 0 the skin of both sides
@@ -130,48 +131,22 @@ class Creases:
             smooth,
         )
 
-    def part(self, points: Any, poses: Poses) -> None:
-        """Separate the two sides of bent joints, in place.
-
-        Args:
-            points: Warp array of deformed vertices on the CPU, vec3, shape (F, V).
-            poses: Their poses.
-        """
-        import warp as wp
-        from warpjld_kernels.touch_crease import measure_creases, move_smoothly, push_creases
-
-        if not len(self.vertex):
-            return
+    def planes(self, poses: Poses) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Unit normals of the planes in F poses, shape (F, C, 3), and how far their joints are bent, shape (F, C): 0
+        where nothing has to be separated."""
         first, second = poses.rotations[:, self.parent], poses.rotations[:, self.joint]
         same = np.where((first * second).sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
         normal = rotate(unit(first + same * second), self.normal)
-        turned = wp.array(np.ascontiguousarray(normal, dtype=np.float32), dtype=wp.vec3, device="cpu")
         angle = 2.0 * np.arccos(np.clip(np.abs((first * second).sum(axis=-1)), 0.0, 1.0))
-        bent = wp.array(
-            np.clip((angle - _BENT[0]) / (_BENT[1] - _BENT[0]), 0.0, 1.0).astype(np.float32), dtype=float, device="cpu"
-        )
-        creases, rows, columns = self._arrays
-        frames, size = len(poses), (len(poses), len(self.vertex))
-        count = wp.zeros(frames, dtype=wp.int32, device="cpu")
-        near = wp.empty(size, dtype=wp.int32, device="cpu")
-        overlap = wp.zeros(points.shape, dtype=float, device="cpu")
-        deepest = wp.zeros((frames, len(self.joint)), dtype=float, device="cpu")
-        measured = [count, near, overlap, deepest]
-        inputs = [creases, turned, bent, points, SHARE, _KEPT]
-        wp.launch(measure_creases, size, inputs=inputs, outputs=measured, device="cpu")
-        if not count.numpy().any():
-            return
-        shift = wp.empty(size, dtype=wp.vec3, device="cpu")
-        total = wp.zeros(points.shape, dtype=wp.vec3, device="cpu")
-        amounts = [_KEPT, _LEAST_APART, _WIDER, _WIDEST, FULL, NONE]
-        for _ in range(_STEPS):
-            inputs = [creases, turned, bent, points, *measured, *rows, *amounts]
-            wp.launch(push_creases, frames, inputs=inputs, outputs=[shift], device="cpu")
-            inputs = [creases, count, near, shift, *columns, total]
-            wp.launch(move_smoothly, frames, inputs=inputs, outputs=[points], device="cpu")
+        bent = np.clip((angle - _BENT[0]) / (_BENT[1] - _BENT[0]), 0.0, 1.0)
+        return normal.astype(np.float32), bent.astype(np.float32)
+
+    def bench(self, points: Any) -> CreaseBench:
+        """Separation of the two sides of bent joints, in place in a Warp array of vertices (V,) on the CPU."""
+        return CreaseBench(self, points)
 
     @cached_property
-    def _arrays(self) -> tuple[Any, list[Any], list[Any]]:
+    def arrays(self) -> tuple[Any, list[Any], list[Any]]:
         """Kernel arguments: the creases, and the smoothing matrix by rows and by columns."""
         import warp as wp
         from warpjld_kernels.touch_crease import Creases as Arrays
@@ -188,6 +163,52 @@ class Creases:
             for matrix in (self.smooth, csr_array(self.smooth.T))
         )
         return out, rows, columns
+
+
+class CreaseBench:
+    """Workspace of one thread for the two sides of bent joints, with launches recorded once.
+
+    Args:
+        creases: The planes.
+        points: Warp array of a frame's vertices on the CPU, vec3, shape (V,), which is changed in place.
+    """
+
+    def __init__(self, creases: Creases, points: Any) -> None:
+        import warp as wp
+        from warpjld_kernels.touch_crease import measure_creases, move_smoothly, push_creases, smooth_overlaps
+
+        arrays, rows, columns = creases.arrays
+        planes, count, size = len(creases.joint), len(points), len(creases.vertex)
+        normal = wp.zeros(planes, dtype=wp.vec3, device="cpu")
+        bent, deepest = (wp.zeros(planes, dtype=float, device="cpu") for _ in range(2))
+        number, near = (wp.zeros(n, dtype=wp.int32, device="cpu") for n in (1, size))
+        overlap, smoothed = (wp.zeros(n, dtype=float, device="cpu") for n in (count, size))
+        total, shift = (wp.zeros(n, dtype=wp.vec3, device="cpu") for n in (count, size))
+        self._normal, self._bent, self._deepest = normal.numpy(), bent.numpy(), deepest.numpy()
+        self._number = number.numpy()
+        frame, listed = [arrays, normal, bent, points], [number, near]
+        self._measure = recorded(measure_creases, min(size, 1), [*frame, SHARE, _KEPT], [*listed, overlap, deepest])
+        self._smooth = recorded(smooth_overlaps, 1, [arrays, *listed, overlap, *rows], [smoothed])
+        amounts = [_KEPT, _LEAST_APART, _WIDER, _WIDEST, FULL, NONE]
+        self._step = (
+            recorded(push_creases, 1, [*frame, *listed, deepest, smoothed, *amounts], [shift]),
+            recorded(move_smoothly, 1, [arrays, *listed, shift, *columns, total], [points]),
+        )
+
+    def part(self, normal: NDArray[np.float32], bent: NDArray[np.float32]) -> None:
+        """Separate the two sides at planes (C, 3) of joints that are bent (C,), as :meth:`Creases.planes` has them."""
+        if not bent.any():
+            return
+        self._normal[...] = normal
+        self._bent[...] = bent
+        self._deepest[...] = 0.0
+        self._number[...] = 0
+        self._measure.launch()
+        if self._number[0]:
+            self._smooth.launch()
+            for _ in range(_STEPS):
+                for command in self._step:
+                    command.launch()
 
 
 @dataclass(frozen=True, eq=False)

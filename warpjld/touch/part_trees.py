@@ -20,14 +20,14 @@ def part_trees(
     meshes: list[tuple[NDArray[np.int32], NDArray[np.float32]]],
     thickness: NDArray[np.float64],
 ) -> Any:
-    """Build the kernel struct ``touch_beneath.PartTrees``; boxes and normals are refitted in every frame.
+    """Build the kernel struct ``touch_trees.PartTrees``; boxes and normals are refitted in every frame.
 
     Args:
         vertices: Rest positions [m], shape (V, 3).
         meshes: Faces of every part (n, 3), and ``border`` of their corners (n, 3); parts may be empty.
         thickness: Thickness of the flesh [m], shape (V,).
     """
-    from warpjld_kernels.touch_beneath import PartTrees
+    from warpjld_kernels.touch_trees import FRAME, PartTrees
     from warpjld_kernels.triangle_tree import Tree
 
     occupied = [k for k, (faces, _) in enumerate(meshes) if len(faces)]
@@ -56,4 +56,6 @@ def part_trees(
     out.thickness = floats(thickness[corners].ravel())
     out.units, out.plain = floats(np.zeros(joined.corners.size)), floats(np.ones(joined.face.size))
     out.real = floats(np.concatenate(real))
+    out.frames = floats(np.zeros(joined.face.size * FRAME))
+    out.framed = numbers(np.zeros(len(joined.face)))
     return out

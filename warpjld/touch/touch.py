@@ -169,7 +169,7 @@ class Touch:
         points: NDArray[np.floating],
         poses: Poses | None,
         threads: int | None,
-        work: Callable[[Bench, NDArray[np.float32], NDArray[np.float64] | None], Overlaps],
+        work: Callable[..., Overlaps],
     ) -> tuple[NDArray[np.float32], list[Overlaps]]:
         """Apply ``work`` to every frame after separating the two sides of joints; vertices and overlaps of each."""
         count = len(self.patches.part)
@@ -181,10 +181,9 @@ class Touch:
         from warpjld_kernels.touch_samples import find_samples
 
         moved = np.array(points, dtype=np.float32)
-        if self.creases is not None and poses is not None:
-            self.creases.part(wp.array(moved, dtype=wp.vec3, device="cpu", copy=False), poses)
         found: dict[int, Overlaps] = {}
         places = [None] * len(points) if poses is None else poses.positions
+        planes = None if self.creases is None or poses is None else self.creases.planes(poses)
 
         if threads is None:
             threads = threads_for(moved.shape[0] * count, _SPLIT_BELOW)
@@ -195,7 +194,7 @@ class Touch:
         def span(begin: int, end: int) -> None:
             bench = free.get()
             for k in range(begin, end):
-                found[k] = work(bench, moved[k], places[k])
+                found[k] = work(bench, moved[k], places[k], None if planes is None else (planes[0][k], planes[1][k]))
 
         in_threads(span, len(points), threads, find_samples, wp.get_device("cpu"))
         return moved, [found[k] for k in range(len(points))]
@@ -212,7 +211,7 @@ class Touch:
     def _made(self, count: int) -> list[Bench]:
         """Workspaces for ``count`` threads; Warp's meshes cannot be created in several threads at once."""
         while len(self._benches) < count:
-            self._benches.append(Bench(self._model, self._vertices))
+            self._benches.append(Bench(self._model, self._vertices, self.creases))
         return self._benches[:count]
 
     def _deep(self, found: Overlaps, frame: int) -> list[Touched]:
