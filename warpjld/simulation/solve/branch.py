@@ -132,5 +132,6 @@ def solve_branch(
         objects[name] = replace(objects[name], other=lambda time: prescribed(share(time)))
     aside = replace(model, hands=tuple(hands.values()), objects=tuple(objects.values()))
     times = [begin + length * (k + 1) / steps for k in range(steps)]
-    bounds = {"halvings": halvings, "solves": solves, "tolerance": tolerance}
-    return solve_onward(aside, history, after, times, loads=loads, **bounds)
+    return solve_onward(
+        aside, history, after, times, loads=loads, halvings=halvings, solves=solves, tolerance=tolerance
+    )
