@@ -338,3 +338,11 @@ def test_forces_depend_little_on_the_size_of_elements() -> None:
 
 def test_points_are_placed(tmp_path) -> None:
     assert runpy.run_path(str(EXAMPLES / "place_points.py"))["main"](tmp_path) < 8.0
+
+
+@pytest.mark.slow
+def test_a_misplaced_joint_is_found_and_moved_back(tmp_path) -> None:
+    messages, away = runpy.run_path(str(EXAMPLES / "misplaced.py"))["main"](tmp_path, (120, 90))
+    assert [m.partition(" ")[0] for m in messages] == ["left.index.knuckle2"]
+    assert away < 3.0
+    assert (tmp_path / "moved.png").stat().st_size > 1000
