@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.covering.laplacian import cotangents
+from warpjld.geometry.spatial_order import spatial_order
 from warpjld.runtime.lazily import lazy_module
 from warpjld.runtime.threads import in_threads, one_blas_thread, threads_for
 
@@ -30,8 +31,6 @@ _THREAD = 100_000  # smallest number of unknowns times right-hand sides worth a 
 _TOLERANCE = 1e-7  # residual at which iterative solvers stop, relative to the right-hand side
 _ACCEPTED = 1e-5  # largest relative residual of an accepted solution
 _MULTIGRID_STEPS = 200  # iteration limit
-_MEAN = 1e-8  # residual of a field that is diffused alone, relative: mirror images differ by less than rounding shows
-_MEAN_STEPS = 1_000  # its iteration limit; beyond it the field is left as it was
 _PLAIN_STEPS = 5_000  # iteration limit of conjugate gradients without multigrid
 
 
@@ -89,9 +88,9 @@ def diffused(
     faces: NDArray[np.int32],
     tau: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """One field after heat diffusion over a surface in two implicit steps, by conjugate gradients, shape (V,).
+    """One field after heat diffusion over a surface in two implicit steps, shape (V,).
 
-    For a single field of which few digits matter; without the conductivity around saddle vertices.
+    Without the conductivity around saddle vertices. A field that cannot be diffused is left as it is.
 
     Args:
         values: The field, shape (V,).
@@ -100,16 +99,16 @@ def diffused(
         tau: Square of the diffusion length at every vertex [m²], shape (V,).
     """
     laplacian, area = cotangents(vertices, faces, lambda i, j: (tau[i] + tau[j]) / 4.0)
-    scale, scaled = _unit_diagonal(sp.diags_array(area) + laplacian)
-    out = values
-    with one_blas_thread():
-        for _ in range(2):
-            goal = scale * area * out
-            found, failed = linalg.cg(scaled, goal, x0=out / scale, rtol=_MEAN, atol=0.0, maxiter=_MEAN_STEPS)
-            if failed:
-                return values
-            out = scale * found
-    return out
+    order = spatial_order(vertices)
+    matrix = sp.csr_array(sp.diags_array(area) + laplacian)[order][:, order]
+    out = values.copy()
+    if not np.isfinite(matrix.data).all():
+        return values
+    try:
+        out[order] = DiffusionFactor(matrix).solve(values[order, None], weight=area[order], times=2)[:, 0]
+    except (ArithmeticError, RuntimeError):
+        return values
+    return out if np.isfinite(out).all() else values
 
 
 class DiffusionFactor:

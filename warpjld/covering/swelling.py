@@ -27,6 +27,7 @@ from warpjld.covering.parameters import default_parameters
 from warpjld.covering.rows import rows_of, scalar_inputs
 from warpjld.covering.volume_change import Bending, Driven, Swollen
 from warpjld.geometry.rotations import unit
+from warpjld.runtime.threads import helpers, threads_for
 from warpjld.skeleton.channels import FLEXION
 from warpjld.skeleton.kinematics import poses_from_angles
 from warpjld.skeleton.tree import CHANNELS
@@ -48,6 +49,7 @@ _THICKEST = 2.0  # upper bound of the pairs' factors: with 3 hands of few vertic
 _ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of the joints of its rank
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _EXACT = 1e-9  # change of an amplitude that ends its fit
+_THREAD = 100_000  # smallest number of joints times vertices worth a thread of its own
 _ABDUCTION = CHANNELS.index("abduction")
 
 
@@ -74,17 +76,27 @@ def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.
     parameters = replace(covering.parameters, inflation=default.inflation, muscle=default.muscle, palm=default.palm)
     bending = Bending(covering, rows_of(covering.fields, skeleton, covering.anchors, parameters))
     driven, ratios = _driven(covering, parameters, poses)
-    for joint, own, end in zip(joints, angles, last, strict=True):
-        frames = np.arange(end - len(own), end)
-        around = bending.around(int(joint))
-        if around is not None:
-            part, swelling = around
-            swollen = part.swollen(driven[frames], swelling[:, None] * ratios[frames, joint])
-            amplitudes[joint], lost[joint] = _amplitude(swollen)
-            pairs = _swinging(covering, int(joint)) if amplitudes[joint] >= _MOST else np.zeros(0, dtype=np.int64)
-            if pairs.size:
-                thick = part.thickened(driven[frames], pairs)
-                factors[pairs] = 1.0 + _amplitude(swollen.and_also(amplitudes[joint], thick), _THICKEST - 1.0)[0]
+
+    def fitted(number: int) -> tuple[float, float, float]:
+        frames, joint = np.arange(last[number] - len(angles[number]), last[number]), int(joints[number])
+        around = bending.around(joint)
+        if around is None:
+            return 0.0, 0.0, 1.0
+        part, swelling = around
+        swollen = part.swollen(driven[frames], swelling[:, None] * ratios[frames, joint])
+        amplitude, without = _amplitude(swollen)
+        pairs = _swinging(covering, joint)
+        if amplitude < _MOST or not pairs.size:
+            return amplitude, without, 1.0
+        left_over = swollen.and_also(amplitude, part.thickened(driven[frames], pairs))
+        return amplitude, without, 1.0 + _amplitude(left_over, _THICKEST - 1.0)[0]
+
+    threads = threads_for(len(joints) * len(covering.surface.vertices), _THREAD)
+    found = helpers(threads + 1).map(fitted, range(len(joints))) if threads > 1 else map(fitted, range(len(joints)))
+    amplitudes[joints], lost[joints], thicker = zip(*found, strict=True)
+    for joint, factor in zip(joints, thicker, strict=True):
+        pairs = _swinging(covering, int(joint))
+        factors[pairs] = np.maximum(factors[pairs], factor)
     return amplitudes * _together(covering, bending, parameters, amplitudes, lost), factors
 
 
