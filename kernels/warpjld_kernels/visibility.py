@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warpjld_kernels.lanes import VECTORISED
+from warpjld_kernels.lanes import VECTORISED, prelude
 
 # the same options as the deforming kernels, so that both use one precompiled header, which takes longest to compile
 wp.set_module_options(VECTORISED)
@@ -17,6 +17,47 @@ def closest_on_segment(point: wp.vec3, start: wp.vec3, end: wp.vec3) -> wp.vec3:
     along = end - start
     t = wp.dot(point - start, along) / wp.max(wp.dot(along, along), 1.0e-20)
     return start + wp.clamp(t, 0.0, 1.0) * along
+
+
+LANES = 8
+"""Distances compared at once; rows of them are padded to a multiple of it."""
+
+NOWHERE = wp.constant(1.0e30)  # distance of padding, beyond all others
+
+
+@wp.func_native(
+    prelude(LANES)
+    + """
+    const float* own = distances.data + size_t(row) * distances.shape[1];
+    for (int base = (last + 1) / N * N; base < distances.shape[1]; base += N) {
+        const Floats away = *(const Stored*)(own + base);
+        unsigned int near = LANES_OF(away >= level) & LANES_OF(away <= level + tie);
+        if (base <= last) near &= ~0u << (last + 1 - base);
+        if (near) return base + FIRST_OF(near);
+    }
+    return -1;
+"""
+)
+def next_of(distances: wp.array2d(dtype=float), row: int, last: int, level: float, tie: float) -> int:
+    """First segment after ``last`` whose distance is ``level`` or up to ``tie`` more; -1 for none."""
+
+
+@wp.func_native(
+    prelude(LANES)
+    + """
+    const float* own = distances.data + size_t(row) * distances.shape[1];
+    Floats least = Floats(1e30f);
+    for (int base = 0; base < distances.shape[1]; base += N) {
+        const Floats away = *(const Stored*)(own + base);
+        least = LOWEST(least, away > beyond ? away : Floats(1e30f));
+    }
+    float out = 1e30f;
+    for (int l = 0; l < N; ++l) out = PICK(least, l) < out ? PICK(least, l) : out;
+    return out;
+"""
+)
+def least_beyond(distances: wp.array2d(dtype=float), row: int, beyond: float) -> float:
+    """Least distance greater than ``beyond``; ``NOWHERE`` for none."""
 
 
 @wp.kernel
@@ -39,14 +80,16 @@ def nearest_visible_segment(
     """Nearest segment whose closest point is visible without crossing the surface; the nearest of all where none is.
 
     Of segments whose distances differ by less than ``tie`` the first one counts as nearest: at a joint two are equally
-    near, and rounding must not decide. ``distances`` has a row of scratch for each point, since segments are tried in
-    order of distance until one is visible.
+    near, and rounding must not decide. ``distances`` has a row of scratch for each point, of the number of segments
+    rounded up to a multiple of ``LANES``, since segments are tried in order of distance until one is visible.
     """
     tid = wp.tid()
     point = points[tid]
     origin = point - inset * normals[tid]
     for s in range(starts.shape[0]):
         distances[tid, s] = wp.length(point - closest_on_segment(point, starts[s], ends[s]))
+    for s in range(starts.shape[0], distances.shape[1]):
+        distances[tid, s] = NOWHERE
     first = int(-1)
     first_distance = float(0.0)
     found = int(-1)
@@ -54,24 +97,14 @@ def nearest_visible_segment(
     level = float(-1.0e30)  # distance of the segments that are tried now, up to ties
     last = int(starts.shape[0])  # the last of them that was not visible
     for _ in range(2 * starts.shape[0]):
-        best = int(-1)
-        best_distance = float(0.0)
-        for s in range(last + 1, starts.shape[0]):
-            distance = distances[tid, s]
-            if best < 0 and distance >= level and distance <= level + tie:
-                best = s
-                best_distance = distance
+        best = next_of(distances, tid, last, level, tie)
         if best < 0:  # none of them is visible: go on to the nearest of those further away
-            further = float(1.0e30)
-            for s in range(starts.shape[0]):
-                distance = distances[tid, s]
-                if distance > level + tie and distance < further:
-                    further = distance
-            if further == 1.0e30:
+            level = least_beyond(distances, tid, level + tie)
+            if level == NOWHERE:
                 break
-            level = further
             last = -1
             continue
+        best_distance = distances[tid, best]
         last = best
         if first < 0:
             first = best

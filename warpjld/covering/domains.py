@@ -181,7 +181,7 @@ def _nearest_visible(
     Offsets of rays and ties of distances are relative to ``size``.
     """
     import warp as wp
-    from warpjld_kernels.visibility import nearest_visible_segment
+    from warpjld_kernels.visibility import LANES, nearest_visible_segment
 
     device = "cpu"
     places = wp.array(points.astype(np.float32), dtype=wp.vec3, device=device)
@@ -192,7 +192,8 @@ def _nearest_visible(
     distance = wp.empty(len(points), dtype=float, device=device)
 
     def span(begin: int, end: int) -> None:
-        scratch = wp.empty((min(_TOGETHER, end - begin), len(lines)), dtype=float, device=device)
+        width = -(-len(lines) // LANES) * LANES
+        scratch = wp.empty((min(_TOGETHER, end - begin), width), dtype=float, device=device)
         for first in range(begin, end, _TOGETHER):
             block = slice(first, min(first + _TOGETHER, end))
             wp.launch(
