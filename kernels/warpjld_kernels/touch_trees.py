@@ -25,12 +25,15 @@ FRAMES = f"""
             b[i] = *(const Stored*)(leaf + W * (3 + i)) - a[i];
             c[i] = *(const Stored*)(leaf + W * (6 + i)) - a[i];
         }}
-        const Floats least = Floats(1e-30f);
+        // edges shorter than this [m] have no direction of their own: any unit vector does
+        const Floats least = Floats(1e-30f), tiny = Floats(1e-14f);
         const Floats side = ROOT(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
         const Floats third = ROOT(HIGHEST(c[0] * c[0] + c[1] * c[1] + c[2] * c[2], least));
         const auto point = side <= 1e-6f * third;
         const Floats inverse = Floats(1.0f) / (point ? third : side);
+        const auto nothing = HIGHEST(side, third) <= tiny;
         for (int i = 0; i < 3; ++i) x[i] = (point ? c[i] : b[i]) * inverse;
+        x[0] = nothing ? Floats(1.0f) : x[0];
         // a triangle without area has any axis across, in which it has no extent
         const auto across = HIGHEST(x[0], -x[0]) < Floats(0.6f);
         const Floats zero = Floats(0.0f), one = Floats(1.0f);
@@ -45,17 +48,18 @@ FRAMES = f"""
         for (int i = 0; i < 3; ++i) y[i] /= wide;
         high = thin ? Floats(0.0f) : wide;
         const Floats back = along - side, second = ROOT(HIGHEST(back * back + high * high, least));
+        const Floats second_x = second <= tiny ? one : back / second, second_y = second <= tiny ? zero : high / second;
+        const Floats third_x = third <= tiny ? one : along / third, third_y = third <= tiny ? zero : high / third;
         const Floats numbers[{FRAME}] = {{
             a[0], a[1], a[2], x[0], x[1], x[2], y[0], y[1], y[2],
             x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0],
-            side, back / second, high / second, second, along / third, high / third, third,
+            side, second_x, second_y, second, third_x, third_y, third,
             point ? Floats(0.0f) : inverse, thin ? Floats(0.0f) : Floats(1.0f) / high, along, side * high}};
         for (int k = 0; k < {FRAME}; ++k) *(Stored*)(out + W * k) = numbers[k];
     }};
 """
 """C++ of ``make_frames``: frames of a leaf's triangles from their corners, in single precision, since offsets from a
-corner are short. They are made, and normals copied, when a query first comes to
-a leaf: most are never visited."""
+corner are short. They are made, and normals copied, when a query first comes to a leaf: most are never visited."""
 
 
 @wp.struct

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -39,9 +40,11 @@ def nearest_weights(point: NDArray[np.float64], corners: NDArray[np.float64]) ->
     return np.asarray(nnls(matrix, np.array([0.0, 0.0, 0.0, heavy]))[0])
 
 
-def test_means_over_near_faces_are_those_of_all_faces_measured_one_by_one() -> None:
+@cache
+def kernel() -> Any:
+    """A kernel that writes what ``beneath`` finds: distance, depth, mean normal, thickness and border."""
     import warp as wp
-    from warpjld_kernels import touch_beneath, touch_trees
+    from warpjld_kernels import touch_beneath
 
     @wp.kernel(module="unique")
     def measure(
@@ -61,27 +64,45 @@ def test_means_over_near_faces_are_those_of_all_faces_measured_one_by_one() -> N
         out[i, 5] = found.thick
         out[i, 6] = found.border
 
+    return measure
+
+
+def beneath(
+    vertices: NDArray[np.float64],
+    meshes: list[NDArray[np.int32]],
+    border: list[NDArray[np.float32]],
+    thickness: NDArray[np.float64],
+    points: list[NDArray[np.float64]],
+) -> tuple[list[NDArray[np.float32]], NDArray[np.float32]]:
+    """Per mesh, what is found at its points (n, 7); and the vertex normals used (V, 3)."""
+    import warp as wp
+    from warpjld_kernels import touch_trees
+
     wp.init()
+    trees = part_trees(vertices, list(zip(meshes, border, strict=True)), thickness)
+    normals = vertex_normals(vertices, np.concatenate(meshes))
+    skin, ones = normal_arrays(vertices, np.concatenate(meshes)), np.ones(len(vertices))
+    skin.unit, skin.plain, skin.known = vectors(normals), floats(ones), numbers(ones)
+    wanted = numbers(np.ones(len(meshes)))
+    wp.launch(touch_trees.fit_trees, len(meshes), inputs=[wanted, vectors(vertices), trees], device="cpu")
+    found = []
+    for part, places in enumerate(points):
+        out = wp.zeros((len(places), 7), dtype=float, device="cpu")
+        wp.launch(kernel(), len(places), inputs=[trees, skin, part, vectors(places), out], device="cpu")
+        found.append(out.numpy())
+    return found, normals
+
+
+def test_means_over_near_faces_are_those_of_all_faces_measured_one_by_one() -> None:
     vertices, meshes = bumpy_balls()
     random = np.random.default_rng(3)
     border = [random.uniform(0.0, 1.0, f.shape).astype(np.float32) for f in meshes]
     thickness = random.uniform(0.5, 1.0, len(vertices))
-    trees = part_trees(vertices, list(zip(meshes, border, strict=True)), thickness)
-    normals = vertex_normals(vertices, np.concatenate(meshes))
-    wanted = wp.array([1, 1], dtype=wp.int32, device="cpu")
-    skin = normal_arrays(vertices, np.concatenate(meshes))
-    skin.unit, skin.plain, skin.known = (
-        vectors(normals),
-        floats(np.ones(len(vertices))),
-        numbers(np.ones(len(vertices))),
-    )
-    wp.launch(touch_trees.fit_trees, 2, inputs=[wanted, vectors(vertices), trees], device="cpu")
+    points = [random.normal(0.0, 0.45, (40, 3)) + np.array([2.5 * part, 0.0, 0.0]) for part in (0, 1)]
+    found, normals = beneath(vertices, meshes, border, thickness, points)
     seen = 0
     for part, faces in enumerate(meshes):
-        points = random.normal(0.0, 0.45, (40, 3)) + np.array([2.5 * part, 0.0, 0.0])
-        out = wp.zeros((len(points), 7), dtype=float, device="cpu")
-        wp.launch(measure, len(points), inputs=[trees, skin, part, vectors(points), out], device="cpu")
-        for point, got in zip(points, out.numpy(), strict=True):
+        for point, got in zip(points[part], found[part], strict=True):
             expected = one_by_one(point, vertices, faces, normals, border[part], thickness)
             if expected is None:
                 continue
@@ -90,6 +111,27 @@ def test_means_over_near_faces_are_those_of_all_faces_measured_one_by_one() -> N
                 seen += 1
                 np.testing.assert_allclose(got, expected, rtol=2e-3, atol=2e-4)
     assert seen > 40
+
+
+def test_distances_to_triangles_of_any_shape_are_exact() -> None:
+    random = np.random.default_rng(5)
+    corners = random.uniform(-0.3, 0.3, (40, 3, 3))
+    corners[:6, 1] = corners[:6, 0]  # edges and points instead of triangles, each corner first
+    corners[2:4, 2] = corners[2:4, 0]
+    corners[6:9, 2] = corners[6:9, 0]
+    corners[9:12, 2] = 0.3 * corners[9:12, 0] + 0.7 * corners[9:12, 1]
+    corners[12:15, 0] = 2.0 * corners[12:15, 1] - corners[12:15, 2]
+    corners[15:20, 2] = corners[15:20, 0] + 1e-4 * (corners[15:20, 2] - corners[15:20, 0])
+    meshes = [np.arange(3, dtype=np.int32)[None] + 3 * k for k in range(len(corners))]
+    # all corners on the boundary: what side a point is on does not matter
+    border = [np.zeros((1, 3), dtype=np.float32)] * len(corners)
+    points = [random.uniform(-0.3, 0.3, (10, 3)) for _ in corners]
+    found, _ = beneath(corners.reshape(-1, 3), meshes, border, np.ones(3 * len(corners)), points)
+    for triangle, places, got in zip(corners, points, found, strict=True):
+        weight = np.array([nearest_weights(point, triangle) for point in places])
+        away = np.linalg.norm(places - weight @ triangle, axis=1)
+        reached = away < 0.99 * REACH
+        np.testing.assert_allclose(got[reached, 0], away[reached], rtol=1e-4, atol=1e-6)
 
 
 def one_by_one(
