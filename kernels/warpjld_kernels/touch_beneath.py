@@ -129,6 +129,19 @@ _NEAREST = """
     stack[0] = (wp::uint32)trees.tree.root.data[part];
     int nearest = -1;
     float best = reach * reach;
+    // begin at the leaf nearest to the point before: points follow one another along the skin
+    const int before = trees.recent.data[part];
+    if (before >= 0) {{
+        for (int base = 0; base < W; base += N) {{
+            const Floats squared = squared_of(trees.frames.data + size_t(before) * {FRAME} * W + base, nullptr);
+            for (unsigned int near = LANES_OF(squared < best); near; near &= near - 1) {{
+                const int l = FIRST_OF(near);
+                if (!(PICK(squared, l) < best)) continue;
+                best = PICK(squared, l);
+                nearest = before * W + base + l;
+            }}
+        }}
+    }}
     while (count) {{
         const wp::uint64 next = stack[--count];
         const wp::uint32 bits = next >> 32;
@@ -166,6 +179,7 @@ _NEAREST = """
         }}
     }}
     if (nearest < 0) return out;
+    trees.recent.data[part] = nearest / W;
     {{
         const size_t leaf = nearest / W;
         const int base = (nearest % W) / N * N, l = nearest % W - base;

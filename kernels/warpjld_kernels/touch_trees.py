@@ -72,7 +72,8 @@ class PartTrees:
     the tree's corners; ``border``, 0 for corners on the mesh's boundary, else 1; ``thickness`` of the flesh at the
     corners [m]; ``plain``, the least of the corners' in ``Normals``; ``real``, 0 for padding triangles in a part's
     last leaf, else 1; ``frames``, the triangles' own axes, from which distances take a quarter of the operations, and
-    ``framed``, by leaf, whether these, ``units`` and ``plain`` are made.
+    ``framed``, by leaf, whether these, ``units`` and ``plain`` are made. ``recent`` is, by part, the leaf nearest to
+    the point measured last, or -1.
     """
 
     tree: Tree
@@ -86,6 +87,7 @@ class PartTrees:
     real: wp.array(dtype=float)
     frames: wp.array(dtype=float)
     framed: wp.array(dtype=wp.int32)
+    recent: wp.array(dtype=wp.int32)
 
 
 @wp.func_native(
@@ -138,3 +140,4 @@ def fit_trees(
     k = wp.tid()
     if wanted[k] != 0:
         fit_tree(trees, k, points)
+        trees.recent[k] = -1

@@ -57,5 +57,5 @@ def part_trees(
     out.units, out.plain = floats(np.zeros(joined.corners.size)), floats(np.ones(joined.face.size))
     out.real = floats(np.concatenate(real))
     out.frames = floats(np.zeros(joined.face.size * FRAME))
-    out.framed = numbers(np.zeros(len(joined.face)))
+    out.framed, out.recent = numbers(np.zeros(len(joined.face))), numbers(np.full(len(meshes), -1))
     return out
