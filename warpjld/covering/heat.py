@@ -147,8 +147,11 @@ class DiffusionFactor:
         count, columns = right.shape
         blocks = -(-columns // TOGETHER)
         values = np.zeros((blocks, count, TOGETHER))
-        for column in range(columns):
-            values[column // TOGETHER, self._place, column % TOGETHER] = right[:, column]
+        for block in range(
+            blocks
+        ):  # a block at a time: single columns would touch each line of memory
+            some = right[:, block * TOGETHER : (block + 1) * TOGETHER]
+            values[block, self._place, : some.shape[1]] = some
         before = self._scale.copy()
         if weight is not None:
             before[self._place] *= weight
@@ -163,8 +166,11 @@ class DiffusionFactor:
             )
 
         in_threads(span, blocks, threads_for(values.size, _THREAD), solve_symmetric, "cpu")
-        out = values.transpose(1, 0, 2).reshape(count, -1)[self._place, :columns]
-        return np.ascontiguousarray(out)
+        out = np.empty((count, columns))
+        for block in range(blocks):
+            some = out[:, block * TOGETHER : (block + 1) * TOGETHER]
+            some[...] = values[block, self._place, : some.shape[1]]
+        return out
 
 
 @contextmanager
