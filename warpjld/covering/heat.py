@@ -147,9 +147,7 @@ class DiffusionFactor:
         count, columns = right.shape
         blocks = -(-columns // TOGETHER)
         values = np.zeros((blocks, count, TOGETHER))
-        for block in range(
-            blocks
-        ):  # a block at a time: single columns would touch each line of memory
+        for block in range(blocks):  # a block at a time: single columns would touch each line of memory
             some = right[:, block * TOGETHER : (block + 1) * TOGETHER]
             values[block, self._place, : some.shape[1]] = some
         before = self._scale.copy()
