@@ -1,5 +1,8 @@
 """Closing a hand: skin touches, nothing goes through the object or other digits; intersections and contacts."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -176,6 +179,14 @@ def test_parts_by_name(covering) -> None:
         part_vertices(covering, "indx")
     with pytest.raises(InputError, match="no digit 'toe'"):
         digit_chains(covering.skeleton, ["toe"])
+
+
+def test_a_digit_without_skin_at_its_end_is_named(covering) -> None:
+    ends = covering.anchors.ends.copy()
+    ends[ends[:, 0] == covering.skeleton.index("index.knuckle3"), 0] = 0
+    bare = SimpleNamespace(skeleton=covering.skeleton, anchors=replace(covering.anchors, ends=ends))
+    with pytest.raises(InputError, match="no skin belongs to the last segment of 'index'"):
+        pad_vertex(bare, "index")
 
 
 def test_the_pad_lies_on_the_palms_side(covering) -> None:

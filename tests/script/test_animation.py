@@ -1,5 +1,8 @@
 """The paper's commands as printed (A §9, R79–R84), and ours beside them."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -16,7 +19,6 @@ def keys(scene: Scene, channel: str) -> dict[float, float]:
 
 def arm_rig(hands):
     """An upper arm and a forearm in front of the coarse hand."""
-    from dataclasses import replace
 
     hand = hands["left"].skeleton
     names = ("left.shoulder", "left.elbow", *hand.names[1:])
@@ -185,3 +187,12 @@ def test_left_and_right_actors_are_told_apart_by_the_side(run, hands) -> None:
 def test_without_actors_the_first_step_is_told() -> None:
     with pytest.raises(InputError, match=r"1:1: there is no actor yet; begin with a line such as HAND LEFT BUILTIN"):
         Interpreter(Scene()).run_text("WRIST LEFT FLEXION AT 0 10")
+
+
+def test_a_rig_in_which_no_hand_was_recognised_is_named(run) -> None:
+    scene = run("FRAMES 0 1")
+    actor = scene.actor()
+    names = tuple(name.replace("left.", "b_") for name in actor.skeleton.names)
+    scene.actors = {actor.name: SimpleNamespace(name="PAW", skeleton=replace(actor.skeleton, names=names))}
+    with pytest.raises(InputError, match="neither hand nor body was recognised in PAW; state its joints with MAP"):
+        Scene.actor_with(SimpleNamespace(actors=scene.actors, actor=lambda: next(iter(scene.actors.values()))), "left")

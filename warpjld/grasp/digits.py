@@ -41,13 +41,17 @@ def pad_vertex(covering: Covering, digit: str) -> int:
     """Vertex in the middle of a digit's pad: on the palmar side of its last segment, at 60 % of its length.
 
     Raises:
-        InputError: There is no such digit.
+        InputError: There is no such digit, or no skin on its last segment.
     """
     (chain,) = digit_chains(covering.skeleton, [digit]).values()
     anchors = covering.anchors
     strongest = anchors.weight.argmax(axis=1)
     rows = np.arange(len(anchors))
     on_last = anchors.ends[anchors.segment[rows, strongest], 0] == chain[-1]
+    if not on_last.any():
+        raise InputError(
+            f"no skin belongs to the last segment of '{digit}': it cannot touch anything; see `warpjld inspect`"
+        )
     ratio, side = anchors.ratio[rows, strongest], anchors.side[rows, strongest]
     # of vertices with similar ratio, the one farthest from the bone on the palmar side
     table = SegmentTable.build(covering.skeleton, anchors.ends)

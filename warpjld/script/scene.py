@@ -263,6 +263,13 @@ class Scene:
         if others:
             names = ", ".join(actor.name for actor in others)
             raise InputError(f"several actors have a {side} side ({names}); choose one with ACTOR")
+        if unknown := [
+            actor.name for actor in self.actors.values() if not any(_has_side(actor, s) for s in ("left", "right"))
+        ]:
+            raise InputError(
+                f"no actor has a {side} side: neither hand nor body was recognised in {', '.join(unknown)}; state its "
+                "joints with MAP (see `warpjld inspect`)"
+            )
         raise InputError(f"no actor has a {side} side; add one with HAND {side.upper()} BUILTIN")
 
 

@@ -167,3 +167,9 @@ def test_a_tail_keeps_its_joints_and_its_end_and_loses_helpers(tube):
 def test_nothing_is_left_out_where_no_skin_tells(tube):
     tree = chain(["A", "B_null", "C_end"], [-1, 0, 1], [(0, 0, 0), (0, 0, 0.04), (0, 0, 0.08)])
     assert canonical_skeleton(tree, *tube).skeleton.names == ("a", "b_null", "c_end")
+
+
+def test_the_end_of_a_digit_of_a_hand_that_is_not_whole_is_its_tip(tube):
+    names = [f"left.index.{joint}" for joint in ("base", "knuckle2", "knuckle3")]
+    finger = chain(names, [-1, 0, 1], [(0.0, 0.0, z) for z in (0.0, 0.04, 0.07)])
+    assert "left.index.tip" in canonical_skeleton(finger, *tube).skeleton.names

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
+from warpjld.skeleton.digits import is_digit
 from warpjld.skeleton.recognise.extremity import find_extremity
 from warpjld.skeleton.recognise.layout import Layout
 from warpjld.skeleton.recognise.painted import Painted
@@ -39,7 +40,7 @@ def add_leaf_ends(
     *,
     branches: bool,
 ) -> None:
-    """Add an end, ``tail3.end``, to every joint without children that owns skin and is no end itself.
+    """Add an end, ``tail3.end`` or ``index.tip``, to every joint without children that owns skin and is no end itself.
 
     It is placed at the end of the skin that the joint owns; without weights, where the surface ends along the
     direction of the bone before.
@@ -65,7 +66,9 @@ def add_leaf_ends(
         else:
             end = _end_of_skin(layout, joint, kids, vertices, faces, painted, _SMALLEST * size)
         if end is not None:
-            added = f"{name}.end"
+            # of a digit of a hand that is not whole it is the tip
+            last = is_digit(name) and name.endswith(".knuckle3")
+            added = f"{name.removesuffix('.knuckle3')}.tip" if last else f"{name}.end"
             while added in layout.names:
                 added += "#2"
             layout.add(added, name, end)
