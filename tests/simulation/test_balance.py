@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -21,6 +23,13 @@ def test_a_grasp_that_pushes_is_not_balanced() -> None:
     assert (
         one.text == "on BOX 61 N press, of which 38 N and 0 N m are left over: what holds BOX in its place bears them"
     )
+
+
+def test_what_lies_in_a_hand_and_is_touched_by_fingers_is_balanced() -> None:
+    one = replace(balance(0.6, 0.72, 0.0), lies=True)
+    assert replace(one, lies=False).unbalanced
+    assert not one.unbalanced
+    assert one.text == "on BOX 0.72 N press, and bear its weight"
 
 
 @pytest.mark.parametrize(

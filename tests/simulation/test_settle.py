@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -54,20 +56,21 @@ def test_a_plate_rests_on_peaks_below_its_middle() -> None:
     assert depth.max() < 1e-5
 
 
-def run(text: str) -> tuple[Scene, Simulation]:
+def run(text: str, folder: Path) -> Simulation:
     scene = Scene(say=lambda _: None)
     Interpreter(scene).run_text(text)
-    return scene, run_contact(scene)
+    return run_contact(scene, folder)
 
 
 @pytest.mark.slow
-def test_a_light_plate_that_is_let_go_stays_on_three_fingers() -> None:
+def test_a_light_plate_that_is_let_go_stays_on_three_fingers(tmp_path: Path) -> None:
     # gravity points to the back of the hand
-    _, found = run(
+    found = run(
         "HAND LEFT BUILTIN\nRATE 30\nGRAVITY 0 9.81 0\nFRAMES 0 20\n"
         "OBJECT PLATE BOX 0.06 0.004 0.04 AT 0.01 -0.030 -0.150\n"
         "PHYSICAL PLATE YOUNG 1e6 POISSON 0.3 DENSITY 300 ELEMENT 0.01\nPOINTS PLATE WHOLE ALL\nHOLD PLATE WHOLE 3\n"
-        "FLESH LEFT INDEX MIDDLE RING ELEMENT 0.005\nFRICTION LEFT PLATE 0.6\nPRESS 0 20 EVERY 10\n"
+        "FLESH LEFT INDEX MIDDLE RING ELEMENT 0.005\nFRICTION LEFT PLATE 0.6\nPRESS 0 20 EVERY 10\n",
+        tmp_path,
     )
     weight = 300.0 * 0.06 * 0.004 * 0.04 * 9.81
     assert found.verdict.status == "RELEASED"
@@ -95,13 +98,14 @@ CURL = "\n".join(
     [("", (0.0, 9.81, 0.0), "0.004 -0.062 -0.085"), ("hand_webxr_generic", (-9.81, 0.0, 0.0), "0.029 -0.033 0.006")],
 )
 def test_a_ball_that_falls_into_an_open_hand_lies_in_it_while_the_hand_closes(
-    file: str, gravity: tuple[float, float, float], place: str, request: pytest.FixtureRequest
+    file: str, gravity: tuple[float, float, float], place: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
     hand = f'"{request.getfixturevalue("data") / file / "left.glb"}"' if file else "BUILTIN"
-    _, found = run(
+    found = run(
         f"HAND LEFT {hand}\nRATE 30\nSPLINE 1\nGRAVITY {' '.join(map(str, gravity))}\nFRAMES 0 80\n{CURL}\n"
         f"OBJECT BALL BALL 0.05 AT {place}\nPHYSICAL BALL YOUNG 1e5 POISSON 0.4 ELEMENT 0.008\n"
-        "FLESH LEFT INDEX MIDDLE RING PINKY PALM ELEMENT 0.006\nFRICTION LEFT BALL 0.6\nPRESS 0 80 EVERY 5\n"
+        "FLESH LEFT INDEX MIDDLE RING PINKY PALM ELEMENT 0.006\nFRICTION LEFT BALL 0.6\nPRESS 0 80 EVERY 5\n",
+        tmp_path,
     )
     assert found.verdict.status == "CONVERGED"
     assert found.verdict.text.startswith("realistic")

@@ -62,8 +62,8 @@ class ObjectBalance:
 
     @property
     def unbalanced(self) -> bool:
-        """Whether it is grasped, and the resultant exceeds the allowed one."""
-        return self.grasped and self.net > max(allowed_net(self.pressing, self.weight), _SLIGHT)
+        """Whether it is grasped, and the resultant exceeds the allowed one, and is not its weight."""
+        return self.grasped and not self.lies and self.net > max(allowed_net(self.pressing, self.weight), _SLIGHT)
 
     @property
     def text(self) -> str:
