@@ -190,7 +190,7 @@ def judged(found: Any) -> dict[str, Any]:
         "net_n": round(net, 2),
         "sum_n": round(total, 2),
         "grip": ", ".join(grip.status for grip in found.solved.grips),
-        "asked": int(all(grip.reached for grip in found.solved.grips)),
+        "asked": int(found.solved.status.name == "CONVERGED" and all(grip.reached for grip in found.solved.grips)),
     }
     status = found.solved.status.name
     if status != "CONVERGED":

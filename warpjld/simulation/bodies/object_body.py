@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,9 @@ from warpjld.simulation.state_variables import Points, PrescribedPoints
 
 __all__ = ["ObjectBody", "RigidFall", "build_object_body", "object_body"]
 
-_FOOT = 0.05
-"""Lowest share of a lifted object's height; the points in it support the object until it is lifted."""
+_FOOT, _WIDE = 0.05, 0.05
+"""Lowest share of a lifted object's height, and least root mean square width of the points in it, over the object's
+extent: these support the object until it is lifted. Where they do not, as below a lemon, the share is doubled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +198,7 @@ def build_object_body(
         if (grip := contact.lifted(name)) is not None:
             volume, support = _lifted(contact, grip, volume)
             if not states:
-                foot = Points("lower" if contact.pull[support.axis] < 0.0 else "upper", support.axis, _FOOT)
+                foot = _foot(volume.mesh.nodes, support.axis, "lower" if contact.pull[support.axis] < 0.0 else "upper")
                 states.append((PrescribedPoints(foot, held=True), foot.choose(volume.mesh.nodes, volume.mesh.nodes)))
         loads, mesh = applied_loads(contact, name, volume.mesh, volume.local)
         volume = replace(volume, mesh=mesh)
@@ -269,6 +270,19 @@ def _lifted(
         density = grip.weight / (float(np.abs(pull).max()) * float(volumes(volume.mesh).sum()))
         volume = replace(volume, physical=replace(volume.physical, density=density))
     return volume, ObjectSupport(axis)
+
+
+def _foot(nodes: NDArray[np.float64], axis: int, side: Literal["lower", "upper"]) -> Points:
+    """The lowest points of an object, enough of them not to lie on a line, on which it could turn."""
+    share, extent = _FOOT, float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    while share < 1.0:
+        foot = Points(side, axis, share)
+        x = nodes[foot.choose(nodes, nodes)]
+        spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False) / np.sqrt(len(x))
+        if len(x) > 2 and spread[1] > _WIDE * extent:
+            return foot
+        share *= 2.0
+    return Points(side, axis, 1.0)
 
 
 def _mean_shift(known: Prescribed, displacement: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -188,7 +188,7 @@ class HandTrials(WeightTrials):
     def rate(self, grip: float) -> float | None:
         """Logarithmic derivative of the contact force before the weight acts, without the medium around the object."""
         closed = self.closed(grip)
-        if not closed.converged or len(closed.last.touches) < 2 or not self.weight.force(closed.last) > 0.0:
+        if not (closed.converged and self.weight.force(closed.last) > 0.0):
             return None
         try:
             return self.weight.rate(*self.squeeze.tangent(grip, closed))
