@@ -71,7 +71,8 @@ def test_it_ends_at_its_limit(rig: Rig, monkeypatch: pytest.MonkeyPatch, power: 
     monkeypatch.setattr(force_limit, "solve_onward", onward)
     monkeypatch.setattr(force_limit, "digit_loads", loads)
     monkeypatch.setattr(force_limit, "replace", lambda one, **new: type(one)(**(vars(one) | new)))
-    clear = SimpleNamespace(nearest=lambda model, time: [], inside=lambda model, time: None)
+    nothing: dict[str, Any] = {"nearest": lambda model, time: [], "between_digits": lambda model, time: []}
+    clear = SimpleNamespace(**nothing, inside=lambda model, time: None)
     limits = ForceLimits({}, 3e5, {}, clear)  # type: ignore[arg-type]
     model, before, reached = Model((Hand("LEFT", Bones(rig.skeleton)),)), None, {}
     for frame in range(1, 7):
