@@ -5,8 +5,8 @@ weight that friction could bear with the pressures of the trial if all of it poi
 grip, and its slope is known from the tangent (``Bracket``). Two pads beside a block hold it from a capacity of 1 on.
 Other grips need more, since friction also balances moments and opposing digits: after a trial with capacity m that
 slides at every point and bears a share b < 1, the target becomes m / b, or what two such trials extrapolate to. A grip
-is the gentlest if its capacity is no more than that within the tolerance, or if friction could bear hardly more than the
-weight with the pressures under it.
+is the gentlest if its capacity is no more than that within the tolerance, or if friction could bear hardly more than
+the weight with the pressures under it.
 
 As long as friction can carry only a few times the weight, sliding may mean that the grip is too small. Beyond that, a
 sliding share that does not change when the force doubles means that contact forces cannot lie in their friction cones,
