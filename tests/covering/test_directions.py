@@ -57,7 +57,7 @@ def smooth_normal(skeleton: Skeleton, poses: Poses, t: float, parameters: Parame
     )
     places = [oracle_smooth.Place(point, [operator], []) for point in (foot, foot + UP)]
     rows = [oracle_smooth.row_of(place, flat, [(1, 2)], 0) for place in places]
-    start, end = (oracle_smooth.evaluate(r, frame, flat, np.zeros(4), skeleton, [(1, 2)], []) for r in rows)
+    start, end = (oracle_smooth.evaluate(r, frame, flat, np.zeros(4), np.ones(0), skeleton, [(1, 2)], []) for r in rows)
     return end - start
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -132,6 +133,11 @@ def _put(name: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], 
     return damage
 
 
+def _edit(**changed: Any) -> Callable[[Any], str]:
+    """One edit of an angle, of an actor that is not in the scene, as a state's text."""
+    return lambda a: json.dumps([{"actor": "A", "joint": 0, "kept": 0, "frame": 1, "value": 0, "channel": 0} | changed])
+
+
 def _holed(array: np.ndarray) -> np.ndarray:
     out = array.copy()
     out.flat[-1] = np.nan
@@ -158,8 +164,9 @@ def _holed(array: np.ndarray) -> np.ndarray:
         (_put("memory0.sticking", lambda a: a.astype(float)), "sticking: want bool"),
         (_put("memory0.friction", lambda a: a[:1]), "friction: want float64 of shape"),
         (_put("correction_rate", lambda a: a[:1]), "rates of correction"),
-        (_put("edits", lambda a: '[{"actor": "A", "joint": 0, "kept": 0, "frame": 1, "value": 0}]'), "not there"),
-        (_put("edits", lambda a: '[{"actor": "A", "joint": 0, "kept": "x", "frame": 1, "value": 0}]'), "want float"),
+        (_put("edits", _edit()), "not there"),
+        (_put("edits", _edit(kept="x")), "want float"),
+        (_put("edits", _edit(actor="LEFT", channel=9)), "want 0 … 3"),
         (_put("edits", lambda a: "[1]"), "cannot be read as a state"),
         (_put("limits", lambda a: '{"caps": [1]}'), "cannot be read as a state"),
         (_put("missed", lambda a: "{"), "cannot be read as a state"),
