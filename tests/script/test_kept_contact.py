@@ -166,7 +166,6 @@ def _holed(array: np.ndarray) -> np.ndarray:
         (_put("correction_rate", lambda a: a[:1]), "rates of correction"),
         (_put("edits", _edit()), "not there"),
         (_put("edits", _edit(kept="x")), "want float"),
-        (_put("edits", _edit(actor="LEFT", channel=9)), "want 0 … 3"),
         (_put("edits", lambda a: "[1]"), "cannot be read as a state"),
         (_put("limits", lambda a: '{"caps": [1]}'), "cannot be read as a state"),
         (_put("missed", lambda a: "{"), "cannot be read as a state"),
