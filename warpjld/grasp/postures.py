@@ -12,8 +12,6 @@ from warpjld.skeleton import CHANNELS, Skeleton
 
 __all__ = ["AHEAD", "CLOSING", "POSTURES", "posture_angles", "posture_for"]
 
-_FINGERS = ("index", "middle", "ring", "pinky")
-
 POSTURES: dict[str, dict[str, dict[str, float]]] = {
     # round objects: fingers spread, thumb against the middle finger
     "sphere": {

@@ -9,9 +9,6 @@ from warpjld.fem.mesh.shape import shape_at, slope_at
 
 __all__ = ["inside_own"]
 
-_CORNERS = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
-)
 _ITERATIONS = 8  # Newton steps to natural coordinates; undistorted elements take one
 _WITHIN = 1.0 + 1e-6
 """Largest natural coordinate that counts as inside; a node on the face between two elements lies in both."""
