@@ -245,7 +245,8 @@ class _Search:
     def _note(self, grip: float, trial: Trial) -> None:
         if trial.loaded and not any(one.loaded for _, one in self.trials[:-1]):
             self._bracket.distrust()  # earlier capacities are those before the weight acted
-        if trial.telling and not trial.held and 0.0 < trial.borne < min(1.0, trial.able):
+        slid = trial.outcome is TrialOutcome.SLIDES or trial.able > 1.0  # else it is too weak whatever else it bears
+        if slid and trial.telling and not trial.held and 0.0 < trial.borne < min(1.0, trial.able):
             self._needed = self._aim * self._enough(trial.able, trial.borne)
         self._bracket.note(grip, trial.able, trial.slope, enough=trial.held)
         self._bracket.target = max(self._needed, self._firmer(trial))
@@ -276,7 +277,7 @@ class _Search:
     def _near(self, trial: Trial) -> bool:
         """Whether the capacity exceeds the target by no more than the tolerance, or what friction could bear under the
         weight exceeds the weight by no more: then no grip holds that presses less by more than that."""
-        if trial.borne <= 1.0 + self._tolerance:
+        if 1.0 < trial.borne <= 1.0 + self._tolerance:  # trials that do not tell more than that all is borne give 1
             return True
         return trial.able <= self._needed / self._aim * (1.0 + self._tolerance)
 
