@@ -229,9 +229,7 @@ def test_holding_a_ball_as_gently_as_can_be(tmp_path) -> None:
     slid = [trial for trial in found["trials"] if not trial["held"]]
     assert slid
     assert all(trial["grip_deg"] < found["grip_degrees"] for trial in slid)
-    # nearly as much slid, or friction could bear hardly more than the weight
-    chosen = next(trial for trial in found["trials"] if trial["grip_deg"] == found["grip_degrees"])
-    assert max(trial["grip_deg"] for trial in slid) > 0.9 * found["grip_degrees"] or 1.0 < chosen["borne"] < 1.11
+    assert max(trial["grip_deg"] for trial in slid) > 0.9 * found["grip_degrees"]
     assert (tmp_path / "touch.png").is_file()
 
 
