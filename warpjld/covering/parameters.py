@@ -14,8 +14,8 @@ from warpjld.errors import InputError
 from warpjld.files.reading import reading
 from warpjld.files.text_file import read_json
 from warpjld.files.whole_file import whole_file
-from warpjld.skeleton.channels import FLEXION
-from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.skeleton.channels import ABDUCTION, FLEXION
+from warpjld.skeleton.tree import Skeleton
 from warpjld.suggest import one_of
 
 __all__ = ["Parameters", "default_parameters", "load_parameters", "save_parameters"]
@@ -104,7 +104,7 @@ def default_parameters(skeleton: Skeleton) -> Parameters:
     bends = (largest > 1e-6) & (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children])
     loss = np.where(bends, _volume_loss(largest) / _volume_loss(np.array(np.pi / 2.0)), 0.0)
     loss[[s.distal for s in skeleton.segments if s.palm]] *= _PALM
-    swing = np.minimum(np.hypot(largest, skeleton.limits[:, CHANNELS.index("abduction"), 1]), _WIDEST)
+    swing = np.minimum(np.hypot(largest, skeleton.limits[:, ABDUCTION, 1]), _WIDEST)
     swings = bends & (swing > 1.01 * largest)
     balls = [s.proximal for s in skeleton.segments if s.palm and swings[s.proximal]]
     loss[balls] = _PALM * _volume_loss(swing[balls]) / _volume_loss(np.array(np.pi / 2.0))

@@ -28,9 +28,8 @@ from warpjld.covering.rows import rows_of, scalar_inputs
 from warpjld.covering.volume_change import Bending, Driven, Swollen
 from warpjld.geometry.rotations import unit
 from warpjld.runtime.threads import helpers, threads_for
-from warpjld.skeleton.channels import FLEXION
+from warpjld.skeleton.channels import ABDUCTION, FLEXION
 from warpjld.skeleton.kinematics import poses_from_angles
-from warpjld.skeleton.tree import CHANNELS
 
 if TYPE_CHECKING:
     from warpjld.covering.covering import Covering
@@ -50,7 +49,6 @@ _ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of the 
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _EXACT = 1e-9  # change of an amplitude that ends its fit
 _THREAD = 100_000  # smallest number of joints times vertices worth a thread of its own
-_ABDUCTION = CHANNELS.index("abduction")
 
 
 def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -136,7 +134,7 @@ def _amplitude(swollen: Swollen, most: float = _MOST) -> tuple[float, float]:
 def _swinging(covering: Covering, joint: int) -> NDArray[np.int64]:
     """Palm pairs of a joint that swings sideways farther than it flexes, as a thumb's root."""
     limits = covering.skeleton.limits[joint]
-    if limits[_ABDUCTION, 1] <= min(limits[FLEXION, 1], _WIDEST):
+    if limits[ABDUCTION, 1] <= min(limits[FLEXION, 1], _WIDEST):
         return np.zeros(0, dtype=np.int64)
     begins = covering.anchors.ends[covering.anchors.pairs, 0]
     return np.flatnonzero((begins == joint).any(axis=1))
@@ -201,9 +199,9 @@ def _measured(skeleton: Skeleton, joint: int, largest: float) -> NDArray[np.floa
     exceeds its flexion, as at a thumb's root, also abducted to either side."""
     angles = np.repeat(skeleton.initial[None], len(_PARTS), axis=0)
     angles[:, joint, FLEXION] = largest * np.array(_PARTS)
-    sideways = skeleton.limits[joint, _ABDUCTION]
+    sideways = skeleton.limits[joint, ABDUCTION]
     if sideways[1] <= largest:
         return angles
     both = np.repeat(angles[None], 2, axis=0)
-    both[:, :, joint, _ABDUCTION] = 0.5 * sideways[:, None] * np.array(_PARTS)
+    both[:, :, joint, ABDUCTION] = 0.5 * sideways[:, None] * np.array(_PARTS)
     return np.concatenate([angles, *both])

@@ -110,10 +110,8 @@ class Making:
 
         solved = found.verdict.frames
         kept = "no frame" if solved is None else f"frames {solved[0]:g} to {solved[1]:g}"
-        pressing, what = (
-            self.scene.contact.pressing,
-            "" if found.verdict.status == SHORT else "contact was not solved: ",
-        )
+        pressing = self.scene.contact.pressing
+        what = "" if found.verdict.status == SHORT else "contact was not solved: "
         return located(
             InputError(f"{what}{found.verdict.text}; {kept} and all files are in {self.folder}"),
             None if pressing is None else pressing.where,
