@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.skeleton.channels import FLEXION
+from warpjld.skeleton.channels import ABDUCTION, FLEXION
 from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, poses_beside_rest
 from warpjld.skeleton.tree import CHANNELS, Skeleton
@@ -18,7 +18,6 @@ __all__ = ["CURL", "calibration_poses", "curled", "guard_poses"]
 CURL = {"base": 80.0, "knuckle2": 97.0, "knuckle3": 63.0}
 """Flexion [degrees] of a finger's joints in a full curl; the thumb is not curled."""
 
-_ABDUCTION = CHANNELS.index("abduction")
 _WIDEST = np.radians(120.0)  # largest flexion used: beyond, limbs touch each other at shoulders, knees and elbows
 _UNKNOWN = np.radians(30.0)  # flexion used where limits are symmetric, so that the joint's direction is not known
 _TOE = re.compile(r"^toe\d")
@@ -127,7 +126,7 @@ def _fists(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.flo
     angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, amount in enumerate((0.5, 0.8)):
         angles[frame, digits, FLEXION] = amount * largest[digits]
-        angles[frame, roots, _ABDUCTION] = 0.5 * amount * skeleton.limits[roots, _ABDUCTION, 0]
+        angles[frame, roots, ABDUCTION] = 0.5 * amount * skeleton.limits[roots, ABDUCTION, 0]
     return angles[[bool(digits)] * 2]
 
 
@@ -136,7 +135,7 @@ def _thumbs(skeleton: Skeleton, bends: NDArray[np.int64], largest: NDArray[np.fl
     roots = [j for j in bends if skeleton.names[j].endswith("thumb.base")]
     angles = np.zeros((2, len(skeleton), len(CHANNELS)))
     for frame, end in ((0, 0), (1, 1)):
-        angles[frame, roots, _ABDUCTION] = 0.5 * skeleton.limits[roots, _ABDUCTION, end]
+        angles[frame, roots, ABDUCTION] = 0.5 * skeleton.limits[roots, ABDUCTION, end]
     angles[0, roots, FLEXION] = largest[roots]
     return angles[[bool(roots)] * 2]
 
@@ -150,8 +149,8 @@ def _random(
     angles = np.zeros((frames, len(skeleton), len(CHANNELS)))
     part = generator.uniform(0.0, 1.0, (frames, 2, len(known)))[:, :, kind]
     angles[:, bends, FLEXION] = part[:, 0] * largest[bends]
-    low, high = (np.clip(skeleton.limits[bends, _ABDUCTION, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
-    angles[:, bends, _ABDUCTION] = 0.5 * (low + part[:, 1] * (high - low))
+    low, high = (np.clip(skeleton.limits[bends, ABDUCTION, k], -_WIDEST / 4, _WIDEST / 4) for k in (0, 1))
+    angles[:, bends, ABDUCTION] = 0.5 * (low + part[:, 1] * (high - low))
     return angles
 
 

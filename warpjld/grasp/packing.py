@@ -19,8 +19,8 @@ from warpjld.covering.rows import Padded
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import conjugate, multiply
 from warpjld.grasp.struct_arrays import StructArrays
-from warpjld.skeleton import CHANNELS, Poses, Skeleton
-from warpjld.skeleton.channels import FLEXION
+from warpjld.skeleton import Poses, Skeleton
+from warpjld.skeleton.channels import ABDUCTION, FLEXION, PIVOT, TWISTING
 
 __all__ = [
     "Chains",
@@ -170,11 +170,11 @@ def fill_drives(
     channels = angles[frame[:, None], j]
     mirror = skeleton.mirror[j]
     direction, axis = skeleton.directions[j], skeleton.axes[j]
-    before = _about(skeleton.normals[j], mirror * channels[..., CHANNELS.index("abduction")])
+    before = _about(skeleton.normals[j], mirror * channels[..., ABDUCTION])
     if skeleton.initial_turns is not None:  # turns count from rest
         before = multiply(conjugate(skeleton.initial_turns[j]), before)
-    bend = _turn(_about(direction, mirror * channels[..., CHANNELS.index("pivot")]), axis)
-    after = _about(direction, -mirror * channels[..., CHANNELS.index("twisting")])
+    bend = _turn(_about(direction, mirror * channels[..., PIVOT]), axis)
+    after = _about(direction, -mirror * channels[..., TWISTING])
     first = Rotation.from_quat(_flat(before))
     local = first * Rotation.from_quat(_flat(_about(bend, channels[..., FLEXION])))
     local = local * Rotation.from_quat(_flat(after))

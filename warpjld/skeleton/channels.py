@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import about, multiply, rotate
 
-__all__ = ["ABDUCTION", "CHANNELS", "FLEXION", "channel_rotations"]
+__all__ = ["ABDUCTION", "CHANNELS", "FLEXION", "PIVOT", "TWISTING", "channel_rotations"]
 
 CHANNELS = ("flexion", "pivot", "twisting", "abduction")
 """Angles of a joint, in the order of their last array axis. Abduction is this project's addition: the paper's
 pivot turns the flexion axis about the segment (R27) and so moves nothing while the joint is straight."""
 
-FLEXION, ABDUCTION = CHANNELS.index("flexion"), CHANNELS.index("abduction")
-"""Indices of these channels."""
+FLEXION, PIVOT, TWISTING, ABDUCTION = range(len(CHANNELS))
+"""Indices of the channels."""
 
 
 def channel_rotations(
