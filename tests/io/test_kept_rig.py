@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
+import pygltflib as gl
 import pytest
 
 from tests.covering.test_kept_key import modules_reached
@@ -53,6 +54,21 @@ def test_it_is_the_one_that_was_read(hand: Path, read: list[Path]) -> None:
     first, again = kept_rig(hand), kept_rig(str(hand))
     assert read == [hand]
     assert _same(again, load_rig(hand))
+    assert _same(first, again)
+
+
+def test_pictures_inside_the_file_are_kept(hand: Path, read: list[Path]) -> None:
+    """A base colour texture in the file's own buffer, as most textured rigs have theirs."""
+    file = gl.GLTF2().load_binary(str(hand))
+    file.images, file.textures = [gl.Image(bufferView=0, mimeType="image/png")], [gl.Texture(source=0)]
+    painted = gl.PbrMetallicRoughness(baseColorTexture=gl.TextureInfo(index=0))
+    file.materials = [gl.Material(pbrMetallicRoughness=painted)]
+    for primitive in file.meshes[0].primitives:
+        primitive.material = 0
+    file.save_binary(str(hand))
+    first, again = kept_rig(hand), kept_rig(hand)
+    assert len(read) == 1
+    assert first.surface.parts[0].texture
     assert _same(first, again)
 
 

@@ -303,6 +303,30 @@ def test_what_is_let_go_slides_off_a_soft_slope() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("what", "turned"),
+    [("CYLINDER 0.06 0.1", "20 0 30"), ("BOX 0.04 0.06 0.03", "20 0 30"), ("BALL 0.06", "0 0 0")],
+)
+def test_soft_objects_lie_on_a_floor_as_they_fell(what: str, turned: str) -> None:
+    """Where they come to rest as rigid bodies they are in equilibrium as soft ones, too, even if free to roll: the
+    floor bears their weight, and they give way to it."""
+    _, found = run(
+        f"OBJECT FLOOR BOX 0.6 0.02 0.6 AT 0 -0.01 0\nOBJECT IT {what} AT 0 0.12 0 TURN {turned}\n"
+        "PHYSICAL IT YOUNG 30000 DENSITY 500 ELEMENT 0.015\nGRAVITY 0 -9.81 0\nFRAMES 0 50\nPRESS 0 50 EVERY 50\n"
+    )
+    assert found.verdict.status == "CONVERGED"
+    assert "comes to rest on FLOOR at frame" in found.verdict.text
+    assert found.frames.tolist() == [50.0]
+    pull = found.model.pull("IT").sum(axis=0)
+    assert found.force("IT")[-1] == pytest.approx(-pull, rel=1e-3, abs=1e-3 * np.linalg.norm(pull))
+    rested, lying = (found.surfaces.object("IT", frame) for frame in (found.solved.start, 50.0))
+    assert rested is not None
+    assert lying is not None
+    assert lying[:, 1].min() == pytest.approx(0.0, abs=3e-4)
+    assert 0.0 < rested[:, 1].mean() - lying[:, 1].mean() < 0.003
+
+
+@pytest.mark.slow
 def test_a_ball_at_rest_is_flattened_by_its_weight() -> None:
     """A soft ball that fell on a table is solved at rest: its height falls by Hertz's approach (Johnson 1985, §4.2)."""
     _, found = run(

@@ -155,10 +155,10 @@ class FramesRun:
         return None
 
     def _settled_objects(self, time: float) -> ContactSolution | None:
-        """The last solution; where free objects came to rest on rigid surfaces, with them at rest on flesh."""
+        """The last solution; where free objects came to rest as rigid bodies, with them at rest as deformable ones."""
         model, last = self.limits.driven(self.model), self.last
-        names = free_objects(model, None if last is None else last.last.time, time)
-        if not (names and model.hands) or self.request.method == "paper":
+        names = free_objects(model, self.contact.bonds, None if last is None else last.last.time, time)
+        if not names or self.request.method == "paper":
             return last
         return settled(model, self.history, last, names)
 

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem import MaterialWarning
+from warpjld.fem import MaterialWarning, SolveStatus
 from warpjld.fem.contact import ContactWarning
 from warpjld.fem.hand.suggestions import DigitSlopes
 from warpjld.runtime.threads import one_blas_thread
@@ -264,8 +264,6 @@ def simulate(
         return reason if request.stop else None
 
     frames = [] if before.interrupted is not None else _frames(specification, request, model.start)
-    if rigid := rests_rigidly(model, before, frames):
-        frames, before = [], replace(before, falls=(*before.falls, rigid))
     identity = cache(partial(identity_of, model, specification, frames))
     checkpoint = CheckpointFile(folder / (request.state or KEPT), identity)
     with warning_texts(ContactWarning, MaterialWarning) as warned:
@@ -280,6 +278,9 @@ def simulate(
             saving=lambda save: keeping(lambda: checkpoint.path if save(checkpoint) else None),
             progress=progress,
         )
+    if rigid := rests_rigidly(solved, before):
+        before = replace(before, falls=(*before.falls, rigid))
+        solved = replace(solved, status=SolveStatus.CONVERGED, message=SolveStatus.CONVERGED.value, unsolved=None)
     before, solved = after_contact(solved, before)
     return _report(solved, before, table, request, notes)
 

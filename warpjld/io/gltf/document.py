@@ -63,7 +63,7 @@ class Document:
         data, start = self.buffers[views[index].buffer], views[index].byteOffset or 0
         if start < 0 or not 0 <= views[index].byteLength <= len(data) - start:
             raise InputError(f"buffer view {index} ends beyond its buffer", path=self.path)
-        return data[start : start + views[index].byteLength]
+        return bytes(data[start : start + views[index].byteLength])
 
     def accessor(self, index: int) -> NDArray[Any]:
         """An accessor's elements, shape (n,), (n, k) or (n, rows, columns); normalised integers as float64.

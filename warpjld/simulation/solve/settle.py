@@ -1,10 +1,11 @@
-"""From where a fallen object came to rest on rigid skin to its equilibrium on deformable flesh (R139).
+"""From where a fallen object came to rest as a rigid body to its equilibrium as a deformable one (R139).
 
-A fall is that of a rigid body on rigid surfaces. Where it ends, three points may bear the object; flesh gives way below
-them, and it sinks and turns until more of it is borne, which Newton's method does not follow in one step. It sinks in a
-medium that resists motion in proportion to mass, in backward Euler steps of the overdamped motion (pseudo-transient
-continuation: Kelley and Keyes 1998, SIAM J. Numer. Anal. 35, 508–523), while everything else stands still. The medium
-becomes thinner as less is left to balance; what comes to rest in it is in equilibrium without it.
+A fall is that of a rigid body on rigid surfaces. Where it ends, three points may bear the object; it gives way there,
+or flesh below it does, and it sinks and turns until more of it is borne, which Newton's method does not follow in one
+step; what may roll is held by nothing before that. It sinks in a medium that resists motion in proportion to mass, in
+backward Euler steps of the overdamped motion (pseudo-transient continuation: Kelley and Keyes 1998, SIAM J. Numer.
+Anal. 35, 508–523), while everything else stands still. The medium becomes thinner as less is left to balance; what
+comes to rest in it is in equilibrium without it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from warpjld.fem import Loads
 from warpjld.fem.contact import ContactSolution
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.fall.bonded import bonded_groups
 from warpjld.simulation.solve.branch import solve_onward
+from warpjld.simulation.specification import BondStrength
 
 __all__ = ["free_objects", "settled"]
 
@@ -35,14 +38,17 @@ _STEPS, _FAILURES, _SOLVES = 60, 4, 20
 """Most steps, most that fail one after another, and most linear solves of one."""
 
 
-def free_objects(model: ContactModel, since: float | None, time: float) -> list[str]:
-    """Objects with weight that nothing holds at a time, and that were falling until then, or are at their start
-    (``since`` None) [frames from the model's start]."""
+def free_objects(model: ContactModel, bonds: Sequence[BondStrength], since: float | None, time: float) -> list[str]:
+    """Objects with weight that nothing holds at a time, neither themselves nor what they are bonded to, and that were
+    falling until then, or are at their start (``since`` None) [frames from the model's start]."""
+    held = {one.name for one in model.objects if len(one.prescribed(time, History()).degrees) or one.rides(time)}
+    groups = bonded_groups([one.name for one in model.objects], bonds)
+    held |= {name for group in groups if not held.isdisjoint(group) for name in group}
     out = []
     for one in model.objects:
         fell = since is None or any(abs(fall.ends - since) < _MOMENT for fall in one.falls)
-        if fell and not len(one.prescribed(time, History()).degrees) and not one.rides(time):
-            out += [one.name] if np.any(model.pull(one.name)) else []
+        if fell and one.name not in held and np.any(model.pull(one.name)):
+            out.append(one.name)
     return out
 
 
