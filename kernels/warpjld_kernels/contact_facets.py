@@ -1,4 +1,4 @@
-"""Broad phase of mortar contact: pairs of facets whose bounding boxes overlap."""
+"""Broad phase of mortar contact: pairs of facets whose bounding boxes overlap, and which of them may face each other."""
 
 import warp as wp
 
@@ -33,3 +33,31 @@ def facet_pairs(
             count += 1
     if not fill:
         counts[facet] = count
+
+
+@wp.kernel
+def near_and_facing(
+    first: int,
+    pairs: wp.array2d(dtype=wp.int32),
+    centre: wp.array(dtype=wp.vec3d),
+    radius: wp.array(dtype=wp.float64),
+    normal: wp.array(dtype=wp.vec3d),
+    other_centre: wp.array(dtype=wp.vec3d),
+    other_radius: wp.array(dtype=wp.float64),
+    other_normal: wp.array(dtype=wp.vec3d),
+    reach: wp.float64,
+    facing: wp.float64,
+    # out
+    found: wp.array(dtype=wp.uint8),
+):
+    """1 for pairs that may be within ``reach`` of each other and overlap in projection along the first one's normal,
+    by the spheres around them, and whose unit normals have a cosine below ``facing``; else 0."""
+    row = first + wp.tid()
+    i = pairs[row, 0]
+    j = pairs[row, 1]
+    between = other_centre[j] - centre[i]
+    size = radius[i] + other_radius[j]
+    height = wp.dot(between, normal[i])
+    beside = wp.dot(between, between) - height * height
+    near = wp.abs(height) <= reach + size and beside <= size * size
+    found[row] = wp.uint8(near and wp.dot(normal[i], other_normal[j]) < facing)

@@ -111,15 +111,6 @@ _PAIR = """
     };
     const int* sc = slave.data + 4 * pairs.data[2 * pair];
     const int* mc = master.data + 4 * pairs.data[2 * pair + 1];
-    for (int k = 0; k < 3; ++k) {  // boxes farther apart than that: nothing in them is nearer
-        double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
-        for (int i = 0; i < 8; ++i) {
-            const double at = x.data[3 * (i < 4 ? sc[i] : mc[i - 4]) + k];
-            low[i / 4] = at < low[i / 4] ? at : low[i / 4];
-            high[i / 4] = at > high[i / 4] ? at : high[i / 4];
-        }
-        if (low[0] - high[1] > reach || low[1] - high[0] > reach) return;
-    }
     Real out[33], xs[4][3], xm[4][3], c[3];
     for (int i = 0; i < 33; ++i) out[i] = Real(0.0);
     for (int k = 0; k < 3; ++k) c[k] = Real(0.0);
@@ -146,6 +137,14 @@ _PAIR = """
     for (int k = 0; k < 3; ++k) n[k] = n[k] / size;
     const Real cosine = (n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) / other;
     if (!(value(cosine) < facing)) return;
+    double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};  // heights of the corners above the slave's plane
+    for (int i = 0; i < 8; ++i) {
+        double height = 0;
+        for (int k = 0; k < 3; ++k) height += value(n[k]) * (value(i < 4 ? xs[i][k] : xm[i - 4][k]) - value(c[k]));
+        low[i / 4] = height < low[i / 4] ? height : low[i / 4];
+        high[i / 4] = height > high[i / 4] ? height : high[i / 4];
+    }
+    if (low[1] - high[0] >= reach || high[1] - low[0] <= -reach) return;  // then its weight is 0
     const Real along = root(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
     Real e[3], f[3];
     for (int k = 0; k < 3; ++k) e[k] = a[k] / along;

@@ -114,13 +114,18 @@ def has_room(
         for (int j = 0; j < W; ++j)
             for (int h = 0; h < H; ++h) *(Loose*)(c + j * sc + 8 * h) -= sum[j][h];
     };
+#ifdef __AVX512F__
+    constexpr int TALL = 16;
+#else
+    constexpr int TALL = 8;  // what 16 registers of 4 numbers hold
+#endif
     auto subtract = [&tile](double* c, size_t sc, const double* a, const double* b, size_t s, int top, int m, int n,
                             int depth) {
         for (int j = 0; j < n;) {
             const int wide = n - j >= 6 ? 6 : 3;
-            for (int i = (top + j) / 8 * 8; i < m; i += i + 16 <= m ? 16 : 8) {
+            for (int i = (top + j) / 8 * 8; i < m; i += i + TALL <= m ? TALL : 8) {
                 double* to = c + j * sc + i;
-                if (i + 16 <= m) {
+                if (TALL > 8 && i + TALL <= m) {
                     if (wide == 6) tile((char(*)[2])0, (char(*)[6])0, to, sc, a + i, b + j, s, depth);
                     else tile((char(*)[2])0, (char(*)[3])0, to, sc, a + i, b + j, s, depth);
                 } else {

@@ -22,6 +22,8 @@ __all__ = ["Mortar"]
 
 _FACING = -0.2
 """Cosine of the angle between facet normals below which facets may be in contact."""
+_ROUNDED = 1e-9
+"""Addition to it, and to radii of facets, relatively, where pairs are sorted out: rounding then decides nothing."""
 _TURN = 0.4
 """Width of the transition below that cosine to full contact."""
 _LEAST, _SLIVER, _OFF = 0.05, 0.1, 0.25
@@ -32,6 +34,8 @@ the average over it may decrease while the sides separate, so that there would b
 the load instead."""
 
 
+_KEPT = 3
+"""Number of positions whose integrals are kept: those at the start of a load step, and at two first guesses."""
 _AHEAD = 0.25
 """Displacement of a node, over the search distance, after which facet pairs are searched again."""
 
@@ -48,6 +52,16 @@ class _Near:
         """Whether the list is complete at positions x (N, 3): no node of the surfaces has moved too far."""
         moved = max(float(np.abs(x[one.nodes] - self.x[one.nodes]).max()) for one in surfaces)
         return moved < 0.99 * _AHEAD * self.reach
+
+
+@dataclass(frozen=True, eq=False)
+class _Facing:
+    """Facet pairs (P, 2) that face each other at positions x (N, 3) for a search distance, and their integrals."""
+
+    x: Array
+    reach: float
+    pairs: Ints32
+    integrals: Array
 
 
 def _boxes(x: Array, surface: ContactSurface) -> tuple[Array, Array]:
@@ -104,7 +118,7 @@ class Mortar:
         self.fringe = None if exclusion is None else exclusion.fringe
         self._never = never
         self._near: _Near | None = None
-        self._last: tuple[Array, float, Ints32, Array] | None = None
+        self._last: list[_Facing] = []
 
     def points(self, x: Array, reach: float, normals: Array, *, facing: bool = False) -> ContactPoints:
         """Contact points at positions x (N, 3) [m].
@@ -181,13 +195,35 @@ class Mortar:
         return np.clip(t, 0.0, 1.0), np.where((t > 0.0) & (t < 1.0), 1.0 / whole, 0.0)
 
     def _facing(self, x: Array, reach: float) -> tuple[Ints32, Array]:
-        """Facet pairs that face each other, and their integrals; the last result is cached."""
-        if self._last is None or self._last[1] != reach or not np.array_equal(self._last[0], x):
-            pairs = self._neighbours(x, reach)
-            found = self.integrals(pairs, self.slave.quads, self.master.quads, x, reach)
-            overlapping = found[:, 32] > 0.0
-            self._last = x.copy(), reach, pairs[overlapping], found[overlapping]
-        return self._last[2], self._last[3]
+        """Facet pairs that face each other, and their integrals; the last results are cached."""
+        for known in reversed(self._last):
+            if known.reach == reach and np.array_equal(known.x, x):
+                return known.pairs, known.integrals
+        pairs = self._worth_integrating(self._neighbours(x, reach), x, reach)
+        found = self.integrals(pairs, self.slave.quads, self.master.quads, x, reach)
+        overlapping = found[:, 32] > 0.0
+        self._last = [*self._last[1 - _KEPT :], _Facing(x.copy(), reach, pairs[overlapping], found[overlapping])]
+        return self._last[-1].pairs, self._last[-1].integrals
+
+    def _worth_integrating(self, pairs: Ints32, x: Array, reach: float) -> Ints32:
+        """Those of the pairs (P, 2) whose integrals may differ from 0, by the spheres around their facets."""
+        import warp as wp
+        from warpjld_kernels import contact_facets
+
+        tables: list[Any] = []
+        for surface in (self.slave, self.master):
+            corners = x[surface.quads]
+            centre = corners.mean(axis=1)
+            away = corners - centre[:, None]
+            radius = (1.0 + _ROUNDED) * np.sqrt(np.einsum("fci,fci->fc", away, away).max(axis=1))
+            tables.append(wp.array(centre, dtype=wp.vec3d, device="cpu", copy=False))
+            tables.append(shared(radius))
+            tables.append(wp.array(unit(surface.area_vectors(x)), dtype=wp.vec3d, device="cpu", copy=False))
+        near = np.empty(len(pairs), np.uint8)
+        if len(pairs):
+            arguments = [shared(pairs), *tables, reach, _FACING + _ROUNDED, shared(near)]
+            on_rows(contact_facets.near_and_facing, len(pairs), arguments, threads=self.threads)
+        return np.ascontiguousarray(pairs[near > 0])
 
     def _neighbours(self, x: Array, reach: float) -> Ints32:
         """Candidate facet pairs, shape (P, 2), sorted: a superset of those whose boxes are within ``reach`` [m].
