@@ -222,6 +222,8 @@ def worst_balance(found: Any) -> tuple[float, float, float]:
     import numpy as np
     import trimesh
 
+    from warpjld.fem.load.loads import volumes
+
     if not found.solved.frames:
         return 0.0, 0.0, 0.0
     last, model = found.solved.frames[-1], found.model
@@ -236,9 +238,12 @@ def worst_balance(found: Any) -> tuple[float, float, float]:
         net = float(np.linalg.norm(force.sum(axis=0)))
         if net * worst[1] >= worst[0] * total and total > 0.0:
             other = owner.master if hand == owner.slave else owner.slave
-            weight = 0.0
             if other in model.obstacles:
-                weight = 9810.0 * abs(float(trimesh.Trimesh(*model.obstacles[other].mesh(0.0), process=False).volume))
+                volume = abs(float(trimesh.Trimesh(*model.obstacles[other].mesh(0.0), process=False).volume))
+            else:
+                meshes = {one.name: one.mesh for one in model.objects}
+                volume = float(volumes(meshes[other]).sum()) if other in meshes else 0.0
+            weight = 9810.0 * volume
             worst = (net, total, weight)
     return worst
 
