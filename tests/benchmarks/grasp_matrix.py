@@ -1,13 +1,15 @@
 """Hands × objects × ways to grip: how many end plausibly, how the others end, and what it takes.
 
     PYTHONPATH=.:kernels python tests/benchmarks/grasp_matrix.py --out matrix.csv [--hands left small]
-        [--objects can box] [--tasks squeeze force lift] [--coarse 0.005] [--limit 900] [--again]
+        [--objects can box] [--tasks squeeze force lift] [--coarse 0.005] [--limit 900] [--again] [--shuffle 1]
 
 Every case is GRASP … AUTO, then one of: ``squeeze``, SQUEEZE by 3°; ``force``, SQUEEZE FORCE 4; ``lift``, LIFT the
 object's weight. Objects are rigid, or soft (20 kPa) or stiff (1 MPa) PHYSICAL ones (``ball.soft``); what is lifted is
 PHYSICAL. Each case is a process of its own with a limit in seconds of the processor, so that a busy machine changes no
 row; its row is written as soon as it ends, and cases that have a row are left out, so that a run that was cut off goes
-on. The table is printed at the end, as Markdown.
+on. With ``--shuffle SEED`` cases run in a random order that the seed fixes: rows of a run that is cut off are then a
+fair sample of all, and shares found from them hold for all within their binomial intervals. The table is printed at
+the end, as Markdown.
 
 Data of others is looked for in ``shared/data`` beside the repository; without it only built-in hands and objects run.
 
@@ -25,7 +27,9 @@ from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import json
+import random
 import resource
 import signal
 import subprocess
@@ -88,6 +92,7 @@ def main() -> None:
     )
     parser.add_argument("--limit", type=float, default=900.0, help="processor seconds a case may take")
     parser.add_argument("--again", action="store_true", help="run cases again that have a row")
+    parser.add_argument("--shuffle", type=int, metavar="SEED", help="run cases in a random order, fixed by the seed")
     parser.add_argument("--script", default="", help="lines added to every script, as FRICTION 0.3")
     parser.add_argument("--pictures", type=Path, help="folder for a picture of every case")
     parser.add_argument("--one", nargs=3, help=argparse.SUPPRESS)
@@ -97,13 +102,14 @@ def main() -> None:
         return
     rows = [] if arguments.again else read(arguments.out)
     done = {(row["hand"], row["object"], row["task"]) for row in rows}
-    for hand in arguments.hands:
-        for thing in arguments.objects:
-            for task in arguments.tasks:
-                if (hand, thing, task) not in done:
-                    rows.append(apart(hand, thing, task, arguments))
-                    write(arguments.out, rows)
-                    print(" ".join(str(rows[-1][c]) for c in COLUMNS), file=sys.stderr, flush=True)
+    cases = list(itertools.product(arguments.hands, arguments.objects, arguments.tasks))
+    if arguments.shuffle is not None:
+        random.Random(arguments.shuffle).shuffle(cases)
+    for one in cases:
+        if one not in done:
+            rows.append(apart(*one, arguments))
+            write(arguments.out, rows)
+            print(" ".join(str(rows[-1][c]) for c in COLUMNS), file=sys.stderr, flush=True)
     print(table(rows))
 
 
@@ -216,6 +222,8 @@ def worst_balance(found: Any) -> tuple[float, float, float]:
     import numpy as np
     import trimesh
 
+    from warpjld.fem.load.loads import volumes
+
     if not found.solved.frames:
         return 0.0, 0.0, 0.0
     last, model = found.solved.frames[-1], found.model
@@ -230,9 +238,12 @@ def worst_balance(found: Any) -> tuple[float, float, float]:
         net = float(np.linalg.norm(force.sum(axis=0)))
         if net * worst[1] >= worst[0] * total and total > 0.0:
             other = owner.master if hand == owner.slave else owner.slave
-            weight = 0.0
             if other in model.obstacles:
-                weight = 9810.0 * abs(float(trimesh.Trimesh(*model.obstacles[other].mesh(0.0), process=False).volume))
+                volume = abs(float(trimesh.Trimesh(*model.obstacles[other].mesh(0.0), process=False).volume))
+            else:
+                meshes = {one.name: one.mesh for one in model.objects}
+                volume = float(volumes(meshes[other]).sum()) if other in meshes else 0.0
+            weight = 9810.0 * volume
             worst = (net, total, weight)
     return worst
 

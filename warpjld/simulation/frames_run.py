@@ -29,6 +29,7 @@ from warpjld.simulation.solve.fallen import falling_model, rest_frames
 from warpjld.simulation.solve.falling import Falls
 from warpjld.simulation.solve.force_limit import BoneInsideError, ForceLimits
 from warpjld.simulation.solve.grasp_balance import weight_of
+from warpjld.simulation.solve.handed_over import HandedOver
 from warpjld.simulation.solve.missed_contacts import MissedContact, missed_contacts
 from warpjld.simulation.solve.settle import free_objects, settled
 from warpjld.simulation.solve.solved_frame import SolvedFrame, solved_frame
@@ -45,6 +46,9 @@ by 120° in 12 steps, and by 130° in 14."""
 
 _LONGER = 0.25
 """Part of a load step by which those of a frame may be longer than asked for, rather than twice as many."""
+
+_MOMENT = 1e-9
+"""Time between two load steps below which they are one [frames]."""
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
@@ -73,6 +77,7 @@ class FramesRun:
     saved: Checkpoint | None = None
     released: float | None = None
     falls: list[Falls] = field(default_factory=list)
+    over: HandedOver | None = None
 
     def __post_init__(self) -> None:
         self.substeps = Substeps(self.model)
@@ -88,6 +93,7 @@ class FramesRun:
         self.last, self.resumed, self.missed = found.solution, len(found.frames), list(found.missed)
         self.corrected, self.uncorrected = list(found.corrected), list(found.uncorrected)
         self.limits.restore(found.limits)
+        self.over = found.over
         self.tight = {(one.actor, one.digit, one.object): (frame, one) for frame, one in found.tight}
         grips, reasons = [restored_grip(content, self.contact) for content in found.grips], []
         for solved, count in zip(found.frames, found.edited, strict=True):
@@ -115,7 +121,7 @@ class FramesRun:
         steps = self._as_searched(model, since, self.substeps.times(model, since, time, now))
         if self.request.limited:
             try:
-                solution = self.limits.solve(model, self.history, before, steps)
+                solution = self._handed_over(since, steps) or self.limits.solve(model, self.history, before, steps)
             except BoneInsideError as error:
                 return self.ended(SolveStatus.BLOCKED, str(error))
             driven = self.limits.driven(model)
@@ -123,7 +129,7 @@ class FramesRun:
             driven = model
             if (inside := self._bone_inside(model, steps)) is not None:
                 return self.ended(SolveStatus.BLOCKED, inside)
-            solution = solve_onward(
+            solution = self._handed_over(since, steps) or solve_onward(
                 model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken
             )
         if not solution.converged:
@@ -149,6 +155,7 @@ class FramesRun:
         self.equilibria[float(frame)] = KnownEquilibrium(self.model, self.history, bare)
         self.missed += missed_contacts(model, self.done[-1] if self.done else None, solution.instants)
         self.last = solution
+        self.over = self.over if self.over is not None and self.over.free > time else None
         self._add(solved_frame(float(frame), solution.instants, solution.states))
         if all(grip.first != frame for grip in self.contact.grips):  # otherwise after the grip search
             self._settle()
@@ -161,6 +168,20 @@ class FramesRun:
         if not names or self.request.method == "paper":
             return last
         return settled(model, self.history, last, names)
+
+    def _handed_over(self, since: float, steps: Sequence[float]) -> ContactSolution | None:
+        """Solve the frame from which on a hand alone holds an object, from the equilibrium its search found; None in
+        other frames, or if the hand is elsewhere by then."""
+        over, model = self.over, self.model
+        start = None if over is None else over.start(self.limits.driven(model), self.history, since, steps[-1])
+        if over is None or start is None:
+            return None
+        ahead = [over.free, *(step for step in steps if step > over.free + _MOMENT)]
+        if self.request.limited:
+            found = self.limits.solve(model, self.history, start, ahead)
+        else:
+            found = solve_onward(model, self.history, start, ahead, method=self.request.method)
+        return found if found.converged else None
 
     def _as_searched(self, model: ContactModel, since: float, steps: list[float]) -> list[float]:
         """Load steps of a frame in which a grip closes, refined to be no longer than those of the grip search.
@@ -202,7 +223,7 @@ class FramesRun:
         tight, limits = tuple(self.tight.values()), self.limits.content()
         parts = (tuple(self.edits), limits, tuple(self.missed), tight, tuple(map(grip_content, self.grips)))
         corrections = tuple(self.corrected), tuple(self.uncorrected)
-        known = Checkpoint(tuple(self.done), self.last, *parts, tuple(self.edited), *corrections)
+        known = Checkpoint(tuple(self.done), self.last, *parts, tuple(self.edited), *corrections, over=self.over)
         self.settled = self.model, known
         if self.released is None:
             self.saved = known
@@ -231,6 +252,8 @@ class FramesRun:
             progress(f"{what}: {line}", len(self.done), total)
 
         found = find_grip(self.model, self.history, grip, self.last, limits, report)
+        apart = all(one.release is None or grip.first - self.model.start >= one.release.free for one in self.grips)
+        self.over = found.over if apart else None  # it knows nothing of what another hand lifts meanwhile
         self.grips.append(found)
         self._edit(found.edits)
         self._release(found)

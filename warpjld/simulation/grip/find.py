@@ -21,6 +21,7 @@ from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.squeeze import Squeeze
 from warpjld.simulation.report.balance import ObjectBalance
+from warpjld.simulation.solve.handed_over import HandedOver
 from warpjld.simulation.specification import GripSpecification
 from warpjld.skeleton.channels import FLEXION
 
@@ -176,12 +177,13 @@ def _gentlest(request: GripSpecification, squeeze: Squeeze, most: float, tell: C
         for grip, trial in found.trials
     ]
     grip, lowered = (0.0, None) if taken is None else (found.grip, taken[0])
-    release = None
+    release = over = None
     if taken is not None:
         first, middle, last = (frame - model.start for frame in (request.first, request.middle, request.last))
         release = SupportRelease(request.object, first, middle, last, trials.ride.least)
+        over = HandedOver(request.actor, last, instant.displacement, trials.found[found.grip].states)
     status, force, digits = found.status.name, found.trial.force, digits_that_press(effort)
-    return FoundGrip(request, status, text, grip, lowered, force, digits, tuple(rows), release=release)
+    return FoundGrip(request, status, text, grip, lowered, force, digits, tuple(rows), release=release, over=over)
 
 
 def _firm(request: GripSpecification, squeeze: Squeeze, most: float, tell: Callable[[str], None]) -> FoundGrip:

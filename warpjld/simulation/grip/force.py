@@ -15,7 +15,7 @@ __all__ = ["ForceGrip", "ForceStatus", "PressedForce", "force_grip"]
 
 _ROUNDS = 24
 """Most grips tried; with slopes three or four are enough."""
-_LOST = 3
+_LOST = 2
 """Grips without an equilibrium after which the search ends."""
 
 

@@ -15,6 +15,7 @@ from warpjld.simulation.bodies.object_body import ObjectBody
 from warpjld.simulation.grip.force import ForceStatus, PressedForce
 from warpjld.simulation.grip.search import GripStatus, Trial
 from warpjld.simulation.report.table import csv_cell
+from warpjld.simulation.solve.handed_over import HandedOver
 from warpjld.simulation.specification import GripSpecification
 
 __all__ = ["FoundGrip", "SupportRelease", "digits_that_press", "trial_row", "write_grips"]
@@ -84,6 +85,7 @@ class FoundGrip:
         release: Release of the object's support; None if it is not released.
         left_out: Digits that press with less than their share of the muscles, as far as they may bend on.
         on_bone: Those of them that may bend no farther because a bone would be inside the object.
+        over: The equilibrium in which the hand alone holds the object; None if it does not, or after a checkpoint.
     """
 
     request: GripSpecification
@@ -98,6 +100,7 @@ class FoundGrip:
     release: SupportRelease | None = None
     left_out: tuple[str, ...] = ()
     on_bone: tuple[str, ...] = ()
+    over: HandedOver | None = None
 
     @property
     def interrupted(self) -> bool:

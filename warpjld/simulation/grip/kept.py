@@ -13,10 +13,13 @@ from warpjld.simulation.specification import ContactSpecification
 
 __all__ = ["grip_content", "restored_grip"]
 
+_APART = ("request", "over")
+"""Fields that are kept elsewhere: the request in the specification, arrays in the checkpoint's own."""
+
 
 def grip_content(found: FoundGrip) -> dict[str, Any]:
     """A grip result as plain values; its specification is identified by the first frame."""
-    content = {one.name: getattr(found, one.name) for one in fields(found) if one.name != "request"}
+    content = {one.name: getattr(found, one.name) for one in fields(found) if one.name not in _APART}
     release = None if found.release is None else asdict(found.release)
     edits = [asdict(edit) for edit in found.edits]
     return content | {"first": found.request.first, "edits": edits, "release": release, "digits": dict(found.digits)}

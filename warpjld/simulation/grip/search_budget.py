@@ -42,7 +42,12 @@ class SearchBudget:
     @property
     def next(self) -> int:
         """Linear solves that the next equilibrium after closing may take, ≥ 0."""
-        return self._trial if self.left is None else min(self._trial, self.left)
+        return self.trial(0)
+
+    def trial(self, usual: int) -> int:
+        """Linear solves that an equilibrium may take which usually takes up to ``usual`` of them, ≥ 0."""
+        most = max(self._trial, usual)
+        return most if self.left is None else min(most, self.left)
 
     def counted(self, solution: ContactSolution) -> ContactSolution:
         """The solution of an equilibrium, after its linear solves are counted."""

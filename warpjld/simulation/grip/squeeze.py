@@ -28,6 +28,8 @@ __all__ = ["TRAVEL", "Squeeze"]
 TRAVEL = 5e-4
 """Largest motion of a joint in one load step [m]: with longer ones Newton's method has trouble with friction."""
 
+_EACH = 20
+"""Linear solves that a load step of closing may take on average; found ones take 4 to 14."""
 _SAME = 1e-9
 """Tolerance for equal grips [rad]."""
 
@@ -93,7 +95,8 @@ class Squeeze:
             return self._closed.get(grip) or self._failed[grip]
         before = max(known for known in self._closed if known <= grip + _SAME)
 
-        steps, closing, most = self.steps(before, grip, TRAVEL), self.closes(before, grip), self.budget.left
+        steps, closing = self.steps(before, grip, TRAVEL), self.closes(before, grip)
+        most = self.budget.trial(_EACH * steps)
         found = solve_branch(self.model, self.history, self._closed[before], steps, moves=closing, solves=most)
         self.budget.counted(found)
         (self._closed if found.converged else self._failed)[grip] = found

@@ -13,10 +13,11 @@ from warpjld.fem.contact import ContactSolution
 from warpjld.fem.contact.law.contact_state import ContactState, initial_state
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.handed_over import HandedOver
 from warpjld.simulation.solve.solved_frame import SolvedFrame
 from warpjld.skeleton.channels import CHANNELS
 
-__all__ = ["check_checkpoint", "plain_record"]
+__all__ = ["check_checkpoint", "check_handed_over", "plain_record"]
 
 _T = TypeVar("_T")
 _TYPES: dict[str, Any] = {
@@ -72,6 +73,23 @@ def check_checkpoint(
     _check_step(solution, count)
     for edit in edits:
         _check_edit(edit, model)
+
+
+def check_handed_over(over: HandedOver, model: ContactModel) -> None:
+    """Check that frames of a model can go on with an equilibrium of a lifted object.
+
+    Raises:
+        InputError: It does not fit the model; names the first fault.
+    """
+    if over.hand not in {hand.name for hand in model.hands}:
+        raise InputError(f"it holds a grip of '{over.hand}', which is none of the hands")
+    if not np.isfinite(over.free):
+        raise InputError(f"its object is handed over at {over.free}; want a finite time")
+    _check(over.displacement, (len(model.body.mesh.nodes), 3), "displacements of a grip")
+    if len(over.states) != len(model.pairs):
+        raise InputError(f"it holds contact states of {len(over.states)} pairs of a grip; want {len(model.pairs)}")
+    for k, state in enumerate(over.states):
+        _check_state(state, model, k)
 
 
 def plain_record(kind: type[_T], content: Mapping[str, Any]) -> _T:

@@ -23,8 +23,9 @@ from warpjld.files.whole_file import whole_file
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.solve.bone_clearance import TightBone
-from warpjld.simulation.solve.checked_checkpoint import check_checkpoint, plain_record
+from warpjld.simulation.solve.checked_checkpoint import check_checkpoint, check_handed_over, plain_record
 from warpjld.simulation.solve.corrected_digit import CorrectedDigit
+from warpjld.simulation.solve.handed_over import HandedOver
 from warpjld.simulation.solve.identity import differences
 from warpjld.simulation.solve.missed_contacts import MissedContact
 from warpjld.simulation.solve.solved_frame import SolvedFrame
@@ -53,6 +54,7 @@ class Checkpoint:
         corrected: Digits that corrections opened.
         uncorrected: Messages about digits that corrections could not help.
         identity: Hashes of the simulation it belongs to, by name of the part (see ``identity_of``).
+        over: Equilibrium with which frames go on once a hand alone holds what it lifts; None if there is none ahead.
     """
 
     frames: tuple[SolvedFrame, ...]
@@ -66,6 +68,7 @@ class Checkpoint:
     corrected: tuple[CorrectedDigit, ...] = ()
     uncorrected: tuple[str, ...] = ()
     identity: Mapping[str, str] = field(default_factory=dict)
+    over: HandedOver | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,8 @@ class CheckpointFile:
             )
         with reading(self.path, _KIND):
             check_checkpoint(found.frames, found.solution, found.edits, model, frames)
+            if found.over is not None:
+                check_handed_over(found.over, model)
         return found
 
     def save(self, state: Checkpoint) -> None:
@@ -141,6 +146,10 @@ def save_checkpoint(path: Path, state: Checkpoint, identity: Mapping[str, str]) 
         arrays["correction_rate"] = solution.correction_rate
     for k, memory in enumerate(solution.states):
         arrays |= {f"memory{k}.{name}": getattr(memory, name) for name in _names(ContactState)}
+    if (over := state.over) is not None:
+        arrays |= {"over.hand": over.hand, "over.free": over.free, "over.displacement": over.displacement}
+        for k, memory in enumerate(over.states):
+            arrays |= {f"over.memory{k}.{name}": getattr(memory, name) for name in _names(ContactState)}
     if (step := solution.last_step) is not None:
         arrays |= {"step.time": step.time, "step.displacement": step.displacement, "step.slips": len(step.slips)}
         arrays |= {f"step.slips{k}": one for k, one in enumerate(step.slips)}
@@ -183,8 +192,10 @@ def _read(file: Any) -> Checkpoint:
         one |= {"frame": float(one["frame"]), "solves": int(one["solves"]), "penetration": float(one["penetration"])}
         nodal_contact = NodalContact(**{name: array[k] for name, array in nodal.items()})
         frames.append(SolvedFrame(nodal_contact=nodal_contact, **one))
-    memories = range(int(file["memories"]))
-    states = tuple(ContactState(**{n: file[f"memory{k}.{n}"] for n in _names(ContactState)}) for k in memories)
+    states, over = _states(file, "memory"), None
+    if "over.hand" in file:
+        free, moved = float(file["over.free"]), file["over.displacement"]
+        over = HandedOver(str(file["over.hand"]), free, moved, _states(file, "over.memory"))
     last, step = frames[-1], None
     if "step.time" in file:
         count = int(file["step.slips"])
@@ -204,7 +215,14 @@ def _read(file: Any) -> Checkpoint:
         tuple(plain_record(CorrectedDigit, one) for one in _json(file, "corrected")),
         tuple(str(one) for one in _json(file, "uncorrected")),
         {str(name): str(value) for name, value in dict(_json(file, "identity")).items()},
+        over,
     )
+
+
+def _states(file: Any, name: str) -> tuple[ContactState, ...]:
+    """Contact states of all pairs."""
+    count = range(int(file["memories"]))
+    return tuple(ContactState(**{n: file[f"{name}{k}.{n}"] for n in _names(ContactState)}) for k in count)
 
 
 def _json(file: Any, name: str) -> Any:
