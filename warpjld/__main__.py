@@ -14,9 +14,7 @@ from warpjld.cli.warn import plain_warnings
 
 __all__ = ["run"]
 
-_OBJECTS = (
-    50_000  # new objects after which reference cycles are searched: at 700 that is a tenth of importing libraries
-)
+_OBJECTS = 50_000  # new objects after which cycles are searched: at 700 that is a tenth of importing libraries
 
 
 def run() -> NoReturn:

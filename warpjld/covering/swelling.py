@@ -59,6 +59,9 @@ def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.
         upper bound applies where hardly any flesh lies on the outside of a joint. And factors of the palm pairs'
         thickening, shape (N,), 1 but where a thumb's amplitude is at its bound.
     """
+    import warp as wp
+    from warpjld_kernels.bent_part import bend_part
+
     skeleton = covering.skeleton
     largest = np.minimum(skeleton.limits[:, FLEXION, 1], _WIDEST)
     bends = (skeleton.parents >= 0) & np.array([bool(c) for c in skeleton.children]) & (largest > 1e-6)
@@ -89,6 +92,7 @@ def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.
         left_over = swollen.and_also(amplitude, part.thickened(driven[frames], pairs))
         return amplitude, without, 1.0 + _amplitude(left_over, _THICKEST - 1.0)[0]
 
+    wp.load_module(bend_part.module, device="cpu")  # compilation is not thread-safe
     threads = threads_for(len(joints) * len(covering.surface.vertices), _THREAD)
     found = helpers(threads + 1).map(fitted, range(len(joints))) if threads > 1 else map(fitted, range(len(joints)))
     amplitudes[joints], lost[joints], thicker = zip(*found, strict=True)
@@ -117,7 +121,7 @@ def _amplitude(swollen: Swollen, most: float = _MOST) -> tuple[float, float]:
     loses = np.repeat(gained.reshape(-1, len(_PARTS)).sum(axis=1) < 0.0, len(_PARTS))
     if not loses.any():
         return 0.0, farthest
-    swollen, gained, slope = swollen.of(loses), gained[loses], slope[loses]
+    gained, slope = gained[loses], slope[loses]
     best = 0.0
     for _ in range(_STEPS):
         square = float(slope @ slope)
@@ -126,7 +130,7 @@ def _amplitude(swollen: Swollen, most: float = _MOST) -> tuple[float, float]:
         last, best = best, min(max(best - float(slope @ gained) / square, 0.0), most)
         if abs(best - last) < _EXACT:
             break
-        gained, slope = swollen.volume_and_slope(best)
+        gained, slope = (every[loses] for every in swollen.volume_and_slope(best))
         gained -= before
     return best, farthest
 
