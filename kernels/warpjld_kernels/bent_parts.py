@@ -1,4 +1,4 @@
-"""Positions of a part of the skin that a joint bends, in float64, and the volume under its faces."""
+"""Positions of the parts of a skin that joints bend, in float64, and the volumes under their faces."""
 
 import warp as wp
 
@@ -38,12 +38,27 @@ def turned(q: wp.quatd, v: wp.vec3d) -> wp.vec3d:
     return v + wp.float64(2.0) / wp.dot(q, q) * wp.cross(u, wp.cross(u, v) + q[3] * v)
 
 
+@wp.struct
+class Parts:
+    """n vertices of several parts of a surface, each in F poses of its own.
+
+    ``chosen`` are their numbers in the surface, ``owner`` the part of each; ``pivot`` and ``first_pose`` are those of a
+    part. ``rims`` map the vertices to the means of open rims.
+    """
+
+    chosen: wp.array(dtype=wp.int32)
+    owner: wp.array(dtype=wp.int32)
+    pivot: wp.array(dtype=wp.vec3d)
+    first_pose: wp.array(dtype=wp.int32)
+    rims: Entries
+
+
 @wp.kernel
-def bend_part(
+def bend_parts(
+    first: int,
     # model
     rows: PartRows,
-    chosen: wp.array(dtype=wp.int32),
-    pivot: wp.vec3d,
+    parts: Parts,
     # poses
     positions: wp.array2d(dtype=wp.vec3d),
     turns: wp.array2d(dtype=wp.quatd),
@@ -53,89 +68,96 @@ def bend_part(
     offset_out: wp.array2d(dtype=wp.vec3d),
     growth_out: wp.array2d(dtype=wp.float64),
 ):
-    """Chosen vertices relative to the pivot as base + growth · offset, shape (n, F) each."""
-    i, f = wp.tid()
-    v = chosen[i]
-    base = -pivot
+    """Vertices from ``first`` on, relative to their part's pivot, as base + growth · offset, shape (n, F) each."""
+    k, f = wp.tid()
+    i = first + k
+    v = parts.chosen[i]
+    p = parts.first_pose[parts.owner[i]] + f
+    base = -parts.pivot[parts.owner[i]]
     for e in range(rows.positions.first[v], rows.positions.first[v + 1]):
-        base += rows.positions.value[e] * positions[f, rows.positions.column[e]]
+        base += rows.positions.value[e] * positions[p, rows.positions.column[e]]
     turn = wp.quatd(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     for e in range(rows.turns.first[v], rows.turns.first[v + 1]):
-        turn += rows.turns.value[e] * turns[f, rows.turns.column[e]]
+        turn += rows.turns.value[e] * turns[p, rows.turns.column[e]]
     growth = wp.float64(1.0)
     for e in range(rows.scales.first[v], rows.scales.first[v + 1]):
-        growth += rows.scales.value[e] * scalars[f, rows.scales.column[e]]
+        growth += rows.scales.value[e] * scalars[p, rows.scales.column[e]]
     raised = wp.vec3d()
     for e in range(rows.muscles.first[v], rows.muscles.first[v + 1]):
-        raised += rows.muscles.value[e] * scalars[f, rows.first_muscle + rows.muscles.column[e]] * rows.heights[e]
+        raised += rows.muscles.value[e] * scalars[p, rows.first_muscle + rows.muscles.column[e]] * rows.heights[e]
     base_out[i, f] = base + turned(turn, raised)
     offset_out[i, f] = turned(turn, rows.offset[v])
     growth_out[i, f] = growth
 
 
 @wp.struct
-class BentPart:
-    """n vertices in F poses, base + (growth + a · more) / (1 + a · at rest) · offset for the amplitude a, and the
-    entries of the map from them to the means of open rims."""
+class Swelling:
+    """Positions base + (growth + a · more) / (1 + a · at rest) · offset of the parts' vertices, a their part's
+    amplitude; shape (n, F), ``at_rest`` (n,)."""
 
     base: wp.array2d(dtype=wp.vec3d)
     offset: wp.array2d(dtype=wp.vec3d)
     growth: wp.array2d(dtype=wp.float64)
     more: wp.array2d(dtype=wp.float64)
     at_rest: wp.array(dtype=wp.float64)
-    rims: Entries
 
 
 @wp.func
-def swollen(part: BentPart, i: int, f: int, amplitude: wp.float64) -> wp.vec3d:
-    thinner = wp.float64(1.0) + amplitude * part.at_rest[i]
-    return part.base[i, f] + (part.growth[i, f] + amplitude * part.more[i, f]) / thinner * part.offset[i, f]
+def swollen(own: Swelling, i: int, f: int, amplitude: wp.float64) -> wp.vec3d:
+    thinner = wp.float64(1.0) + amplitude * own.at_rest[i]
+    return own.base[i, f] + (own.growth[i, f] + amplitude * own.more[i, f]) / thinner * own.offset[i, f]
 
 
 @wp.func
-def drifting(part: BentPart, i: int, f: int, amplitude: wp.float64) -> wp.vec3d:
-    thinner = wp.float64(1.0) + amplitude * part.at_rest[i]
-    return (part.more[i, f] - part.growth[i, f] * part.at_rest[i]) / (thinner * thinner) * part.offset[i, f]
+def drifting(own: Swelling, i: int, f: int, amplitude: wp.float64) -> wp.vec3d:
+    thinner = wp.float64(1.0) + amplitude * own.at_rest[i]
+    return (own.more[i, f] - own.growth[i, f] * own.at_rest[i]) / (thinner * thinner) * own.offset[i, f]
 
 
 @wp.kernel
-def swell_part(
-    part: BentPart,
-    amplitude: wp.float64,
+def swell_parts(
+    first: int,
+    parts: Parts,
+    own: Swelling,
+    amplitudes: wp.array(dtype=wp.float64),
     # out
     points_out: wp.array2d(dtype=wp.vec3d),
     drift_out: wp.array2d(dtype=wp.vec3d),
 ):
-    """Positions of the vertices and of the rims' means, and their derivatives by the amplitude."""
-    i, f = wp.tid()
-    count = part.base.shape[0]
+    """Positions of the vertices, and after them of the rims' means, and their derivatives by the amplitude."""
+    k, f = wp.tid()
+    i = first + k
+    count = own.base.shape[0]
     if i < count:
-        points_out[i, f] = swollen(part, i, f, amplitude)
-        drift_out[i, f] = drifting(part, i, f, amplitude)
+        points_out[i, f] = swollen(own, i, f, amplitudes[parts.owner[i]])
+        drift_out[i, f] = drifting(own, i, f, amplitudes[parts.owner[i]])
         return
     point = wp.vec3d()
     drift = wp.vec3d()
-    for e in range(part.rims.first[i - count], part.rims.first[i - count + 1]):
-        point += part.rims.value[e] * swollen(part, part.rims.column[e], f, amplitude)
-        drift += part.rims.value[e] * drifting(part, part.rims.column[e], f, amplitude)
+    for e in range(parts.rims.first[i - count], parts.rims.first[i - count + 1]):
+        j = parts.rims.column[e]
+        point += parts.rims.value[e] * swollen(own, j, f, amplitudes[parts.owner[j]])
+        drift += parts.rims.value[e] * drifting(own, j, f, amplitudes[parts.owner[j]])
     points_out[i, f] = point
     drift_out[i, f] = drift
 
 
 @wp.kernel
-def sum_volume(
+def sum_volumes(
+    first: int,
+    blocks: wp.array(dtype=wp.int32),
     faces: wp.array2d(dtype=wp.int32),
     points: wp.array2d(dtype=wp.vec3d),
     drift: wp.array2d(dtype=wp.vec3d),
-    together: int,
     # out
     sums_out: wp.array2d(dtype=wp.vec2d),
 ):
-    """Σ a · (b × c) of ``together`` faces a block, and its derivative, shape (blocks, F)."""
-    block, f = wp.tid()
+    """Σ a · (b × c) of the faces ``blocks[b]`` to ``blocks[b + 1]``, and its derivative, shape (blocks, F)."""
+    k, f = wp.tid()
+    block = first + k
     volume = wp.float64(0.0)
     slope = wp.float64(0.0)
-    for t in range(block * together, wp.min((block + 1) * together, faces.shape[0])):
+    for t in range(blocks[block], blocks[block + 1]):
         a = points[faces[t, 0], f]
         b = points[faces[t, 1], f]
         c = points[faces[t, 2], f]
