@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import gc
 import os
 import sys
 import threading
@@ -13,9 +14,12 @@ from warpjld.cli.warn import plain_warnings
 
 __all__ = ["run"]
 
+_OBJECTS = 50_000  # new objects after which cycles are searched: at 700 that is a tenth of importing libraries
+
 
 def run() -> NoReturn:
     """The command line as a process of its own."""
+    gc.set_threshold(_OBJECTS)
     _open_streams()
     plain_warnings()
     try:

@@ -92,6 +92,7 @@ def deform_clip(
     surfaces: tuple[Path, ...] = (),
     motions: tuple[Path, ...] = (),
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
+    moved: LoadedMotion | None = None,
 ) -> ClipFiles:
     """Deform a rig by a motion file, and write its surface or the motion of its joints.
 
@@ -102,6 +103,7 @@ def deform_clip(
         surfaces: Vertex caches to write; suffixes determine their formats.
         motions: Files for the motion of the rig's own joints, likewise.
         report: Called with the current activity, the amount done, and the total.
+        moved: The motion on this rig where it was read before.
 
     Raises:
         InputError: A motion that cannot be read or does not fit the rig, frames it does not have, or a file that
@@ -117,7 +119,8 @@ def deform_clip(
     if surfaces:
         checked_device(how.device)
     rig = how.rig
-    moved = load_motion(motion, rig, animation=animation, **how.reading)
+    if moved is None:
+        moved = load_motion(motion, rig, animation=animation, **how.reading)
     first, last = frame_span(how.span, len(moved.poses))
     poses = moved.poses[slice(first, last + 1)]
     contact = None

@@ -14,6 +14,7 @@ from warpjld.rig import Rig
 
 if TYPE_CHECKING:
     from warpjld.covering import Parameters
+    from warpjld.motion.load import LoadedMotion
 
 __all__ = ["deform_file"]
 
@@ -38,6 +39,7 @@ def deform_file(
     device: str = "cpu",
     threads: int | None = None,
     report: Callable[[str, int, int], None] = lambda what, done, total: None,
+    moved: LoadedMotion | None = None,
 ) -> ClipFiles:
     """Deform a rig by a motion file, and write the surface of every frame, or the motion of the rig's joints.
 
@@ -60,6 +62,7 @@ def deform_file(
         device: Warp device.
         threads: CPU threads; None chooses their number by the work.
         report: Called with the current activity, the amount done, and the total.
+        moved: The motion on this rig where it was read before, by ``load_motion``.
 
     Raises:
         InputError: Nothing to write, or an unusable rig, motion or path: no file is left then.
@@ -96,4 +99,4 @@ def deform_file(
         touch,
         None if binding is None else Path(binding),
     )
-    return deform_clip(how, motion, animation=animation, surfaces=surfaces, motions=motions, report=report)
+    return deform_clip(how, motion, animation=animation, surfaces=surfaces, motions=motions, report=report, moved=moved)

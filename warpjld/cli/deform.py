@@ -133,6 +133,7 @@ def _single(wanted: Wanted, job: ClipJob) -> None:
     from warpjld.batch.deform_file import deform_file
     from warpjld.cli.deform_wanted import checked_parameters, opened_rig
     from warpjld.cli.progress import progress
+    from warpjld.cli.read_ahead import ReadAhead
     from warpjld.io.caches import check_cache
     from warpjld.motion.out import check_motion_out
 
@@ -141,25 +142,30 @@ def _single(wanted: Wanted, job: ClipJob) -> None:
         check_cache(wanted.out)
     for path in wanted.motions_out:
         check_motion_out(path)
-    rig = opened_rig(wanted)
-    with progress(wanted.quiet) as report:
-        made = deform_file(
-            rig,
-            job.motion,
-            wanted.out,
-            motion_out=wanted.motions_out,
-            parameters=checked_parameters(wanted, rig),
-            binding=wanted.binding,
-            domains=wanted.domains,
-            method=wanted.method,
-            touch=wanted.touch,
-            animation=job.animation,
-            frames=wanted.span,
-            device=wanted.device,
-            threads=wanted.threads,
-            report=report,
-            **wanted.reading,
-        )
+    reading = {**wanted.reading, "animation": job.animation}
+    ahead = ReadAhead(wanted.rig, wanted.how, job.motion, reading)
+    try:
+        rig = opened_rig(wanted, ahead.rig)
+        with progress(wanted.quiet) as report:
+            made = deform_file(
+                rig,
+                job.motion,
+                wanted.out,
+                motion_out=wanted.motions_out,
+                parameters=checked_parameters(wanted, rig),
+                binding=wanted.binding,
+                domains=wanted.domains,
+                method=wanted.method,
+                touch=wanted.touch,
+                frames=wanted.span,
+                device=wanted.device,
+                threads=wanted.threads,
+                report=report,
+                moved=ahead.motion(),
+                **reading,
+            )
+    finally:
+        ahead.end()
     warn(made.warnings)
     summary = {
         "rig": wanted.rig,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -99,13 +100,18 @@ class Wanted:
         }
 
 
-def opened_rig(wanted: Wanted) -> Rig:
-    """Open the rig; suspicious findings are printed on stderr."""
+def opened_rig(wanted: Wanted, ahead: Callable[[], Rig | None] = lambda: None) -> Rig:
+    """Open the rig, or take it from ``ahead`` where it was read already; suspicious findings are printed on stderr."""
     from warpjld.cli.rig_argument import open_rig
+    from warpjld.cli.warn import warn
     from warpjld.runtime.quiet import silence_warp
 
     silence_warp()
-    return open_rig(wanted.rig, **wanted.how)
+    rig = ahead()
+    if rig is None:
+        return open_rig(wanted.rig, **wanted.how)
+    warn(rig.suspicious, "suspicious")
+    return rig
 
 
 def checked_parameters(wanted: Wanted, rig: Rig) -> Parameters | None:

@@ -7,17 +7,10 @@ of r^((2π/θ)² − 1) it goes as r, and the slope stays finite: ν = 1 solves 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.runtime.lazily import lazy_module
-
-if TYPE_CHECKING:
-    import scipy.spatial as spatial
-else:
-    spatial = lazy_module("scipy.spatial")
+from warpjld.geometry.within_balls import within_balls
 
 __all__ = ["corner_conductivity"]
 
@@ -51,15 +44,9 @@ def corner_conductivity(
     if not corners.size:
         return np.exp(exponent)
     centroids = vertices[faces].mean(axis=1)
-    tree = spatial.cKDTree(centroids)
     reach = _REACH * np.asarray(thickness, dtype=np.float64)
-    crowd = tree.query_ball_point(vertices[corners], reach[corners], return_length=True)
-    few = (np.cumsum(crowd) <= _MOST_PAIRS) & (crowd > 0)
-    corners, crowd = corners[few], crowd[few]
-    if not corners.size:
-        return np.exp(exponent)
-    near = np.concatenate(tree.query_ball_point(vertices[corners], reach[corners])).astype(np.int64)
-    of = np.repeat(corners, crowd)
+    ball, near = within_balls(centroids, vertices[corners], reach[corners], _MOST_PAIRS)
+    of = corners[ball]
     distance = np.linalg.norm(centroids[near] - vertices[of], axis=1) / reach[of]
     beta = _MARGIN * (turns[of] ** -2.0 - 1.0)
     np.add.at(exponent, near, beta * np.log(np.clip(distance, 1e-6, 1.0)))

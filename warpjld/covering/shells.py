@@ -14,7 +14,6 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from warpjld.geometry.normals import vertex_normals
 from warpjld.geometry.rotations import unit
@@ -122,6 +121,8 @@ def _seams(vertices: NDArray[np.float64], faces: NDArray[np.int32], flesh: NDArr
     size = float(np.linalg.norm(np.ptp(vertices[faces.ravel()], axis=0)))
     if len(border) < 2:
         return np.zeros((0, 2), dtype=np.int64)
+    from scipy.spatial import cKDTree  # its import takes a quarter of a second, and most skin is one shell
+
     return border[cKDTree(vertices[border]).query_pairs(_SEAM * size, output_type="ndarray")].reshape(-1, 2)
 
 

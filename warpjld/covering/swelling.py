@@ -16,18 +16,20 @@ take up, the palm pair between them thickens by more than keeps the area of its 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpjld.covering.bent_parts import BentPart, BentParts, Driven, PackedRows, Swelling
+from warpjld.covering.binding import STATIONS
 from warpjld.covering.drivers import drive
 from warpjld.covering.parameters import default_parameters
-from warpjld.covering.rows import rows_of, scalar_inputs
-from warpjld.covering.volume_change import Bending, Driven, Swollen
+from warpjld.covering.rows import Rows, rows_of, scalar_inputs
+from warpjld.covering.volume_change import Bending
 from warpjld.geometry.rotations import unit
-from warpjld.runtime.threads import helpers, threads_for
 from warpjld.skeleton.channels import ABDUCTION, FLEXION
 from warpjld.skeleton.kinematics import poses_from_angles
 
@@ -48,7 +50,7 @@ _THICKEST = 2.0  # upper bound of the pairs' factors: with 3 hands of few vertic
 _ALIKE = 0.7  # smallest cosine between a joint's axis and the mean axis of the joints of its rank
 _STEPS = 4  # Gauss-Newton steps for one amplitude
 _EXACT = 1e-9  # change of an amplitude that ends its fit
-_THREAD = 100_000  # smallest number of joints times vertices worth a thread of its own
+_POINTS = 1_000_000  # points of parts in poses that are evaluated together, which bounds memory
 
 
 def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -72,30 +74,66 @@ def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.
     last = np.cumsum([len(a) for a in angles])
     default = default_parameters(skeleton)
     parameters = replace(covering.parameters, inflation=default.inflation, muscle=default.muscle, palm=default.palm)
-    bending = Bending(covering, rows_of(covering.fields, skeleton, covering.anchors, parameters))
+    rows = rows_of(covering.fields, skeleton, covering.anchors, parameters)
+    bending, packed = Bending(covering, rows), PackedRows(rows)
     driven, ratios = _driven(covering, parameters, poses)
+    first = last - [len(a) for a in angles]
+    for some in _together_at_once(bending, joints, [len(a) for a in angles]):
+        numbers, found = zip(*some, strict=True)
+        chosen, begin, frames = joints[list(numbers)], first[list(numbers)], len(angles[numbers[0]])
+        parts = BentParts(found, begin, frames)
+        driving = ratios[begin[:, None] + np.arange(frames), chosen[:, None]]  # (P, F)
+        more = np.concatenate([p.swelling for p in found])[:, None] * driving[parts.owner]
+        swelling = parts.swelling(packed, driven, more)
+        amplitudes[chosen], lost[chosen] = _amplitudes(swelling, bending.rest)
+        pairs = [_swinging(covering, int(joint)) for joint in chosen]
+        full = np.array([len(p) > 0 for p in pairs]) & (amplitudes[chosen] >= _MOST)
+        if not full.any():
+            continue
+        thicker = _thickening(rows, parts, driven, begin, pairs)
+        also = _amplitudes(swelling.and_also(amplitudes[chosen], thicker), bending.rest, _THICKEST - 1.0)[0]
+        for part in np.flatnonzero(full):
+            factors[pairs[part]] = np.maximum(factors[pairs[part]], 1.0 + also[part])
+    return amplitudes * _together(covering, bending, packed, parameters, amplitudes, lost), factors
 
-    def fitted(number: int) -> tuple[float, float, float]:
-        frames, joint = np.arange(last[number] - len(angles[number]), last[number]), int(joints[number])
-        around = bending.around(joint)
-        if around is None:
-            return 0.0, 0.0, 1.0
-        part, swelling = around
-        swollen = part.swollen(driven[frames], swelling[:, None] * ratios[frames, joint])
-        amplitude, without = _amplitude(swollen)
-        pairs = _swinging(covering, joint)
-        if amplitude < _MOST or not pairs.size:
-            return amplitude, without, 1.0
-        left_over = swollen.and_also(amplitude, part.thickened(driven[frames], pairs))
-        return amplitude, without, 1.0 + _amplitude(left_over, _THICKEST - 1.0)[0]
 
-    threads = threads_for(len(joints) * len(covering.surface.vertices), _THREAD)
-    found = helpers(threads + 1).map(fitted, range(len(joints))) if threads > 1 else map(fitted, range(len(joints)))
-    amplitudes[joints], lost[joints], thicker = zip(*found, strict=True)
-    for joint, factor in zip(joints, thicker, strict=True):
-        pairs = _swinging(covering, int(joint))
-        factors[pairs] = np.maximum(factors[pairs], factor)
-    return amplitudes * _together(covering, bending, parameters, amplitudes, lost), factors
+def _together_at_once(
+    bending: Bending, joints: NDArray[np.int64], frames: list[int]
+) -> Iterator[list[tuple[int, BentPart]]]:
+    """Numbers among the joints, and the parts that they bend, in groups of the same number of frames and bounded
+    size; joints that bend nothing are left out."""
+    for count in sorted(set(frames)):
+        group: list[tuple[int, BentPart]] = []
+        size = 0
+        for number in np.flatnonzero(np.array(frames) == count).tolist():
+            part = bending.around(int(joints[number]))
+            if part is None:
+                continue
+            if group and size + count * len(part.vertices) > _POINTS:
+                yield group
+                group, size = [], 0
+            group.append((number, part))
+            size += count * len(part.vertices)
+        if group:
+            yield group
+
+
+def _thickening(
+    rows: Rows,
+    parts: BentParts,
+    driven: Driven,
+    first: NDArray[np.int64],
+    pairs: list[NDArray[np.int64]],
+) -> NDArray[np.float64]:
+    """What palm pairs' thickening adds to the growth of the parts' offsets, shape (n, F); ``first`` are the parts'
+    first poses, shape (P,)."""
+    out, joints = np.zeros((len(parts.owner), parts.frames)), len(driven.positions[0])
+    for number, (part, own) in enumerate(zip(parts.parts, pairs, strict=True)):
+        if len(own):
+            columns = joints + (STATIONS * own[:, None] + np.arange(STATIONS)).ravel()
+            scalars = driven.scalars[first[number] : first[number] + parts.frames, columns]
+            out[parts.owner == number] = rows.scales[part.vertices][:, columns] @ scalars.T
+    return out
 
 
 def _driven(covering: Covering, parameters: Parameters, poses: Poses) -> tuple[Driven, NDArray[np.float64]]:
@@ -106,28 +144,33 @@ def _driven(covering: Covering, parameters: Parameters, poses: Poses) -> tuple[D
     return Driven(drivers.positions, turns, scalars), drivers.flexion_ratio
 
 
-def _amplitude(swollen: Swollen, most: float = _MOST) -> tuple[float, float]:
-    """Amplitude, up to ``most``, of the least squared volume error (Gauss–Newton), and the volume [m³] lost without it
-    where the joint is flexed farthest."""
-    before = swollen.part.rest_volume()
-    gained, slope = swollen.volume_and_slope(0.0)
-    gained -= before
-    farthest = max(-float(gained[len(_PARTS) - 1]), 0.0)
+def _amplitudes(
+    swelling: Swelling, rest: NDArray[np.float64], most: float = _MOST
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Amplitude of every part, up to ``most``, of the least squared volume error (Gauss–Newton), and the volume [m³]
+    lost without it where the joint is flexed farthest, shape (P,) each; from rest positions [m], shape (V, 3)."""
+    parts = swelling.parts
+    before = np.array([part.rest_volume(rest) for part in parts.parts])[:, None]
+    best = np.zeros(len(parts))
+    gained, slope = swelling.volume_and_slope(best)
+    gained = gained - before
+    farthest = np.maximum(-gained[:, len(_PARTS) - 1], 0.0)
     # only directions of motion that lose volume are fitted: a thumb may gain it to one side and lose it to the other
-    loses = np.repeat(gained.reshape(-1, len(_PARTS)).sum(axis=1) < 0.0, len(_PARTS))
-    if not loses.any():
-        return 0.0, farthest
-    swollen, gained, slope = swollen.of(loses), gained[loses], slope[loses]
-    best = 0.0
-    for _ in range(_STEPS):
-        square = float(slope @ slope)
-        if square <= 0.0:
-            return 0.0, 0.0
-        last, best = best, min(max(best - float(slope @ gained) / square, 0.0), most)
-        if abs(best - last) < _EXACT:
+    loses = np.repeat(gained.reshape(len(parts), -1, len(_PARTS)).sum(axis=2) < 0.0, len(_PARTS), axis=1)
+    going = loses.any(axis=1)
+    for step in range(_STEPS):
+        if step:
+            gained, slope = swelling.volume_and_slope(best)
+            gained = gained - before
+        square = (loses * slope**2).sum(axis=1)
+        hopeless = going & (square <= 0.0)
+        best[hopeless], farthest[hopeless] = 0.0, 0.0
+        going &= ~hopeless
+        change = (loses * slope * gained).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+        last, best = best, np.where(going, np.clip(best - change, 0.0, most), best)
+        going &= np.abs(best - last) >= _EXACT
+        if not going.any():
             break
-        gained, slope = swollen.volume_and_slope(best)
-        gained -= before
     return best, farthest
 
 
@@ -143,6 +186,7 @@ def _swinging(covering: Covering, joint: int) -> NDArray[np.int64]:
 def _together(
     covering: Covering,
     bending: Bending,
+    packed: PackedRows,
     parameters: Parameters,
     amplitudes: NDArray[np.float64],
     lost: NDArray[np.float64],
@@ -162,11 +206,15 @@ def _together(
         row[joints, FLEXION] = np.minimum(skeleton.limits[joints, FLEXION, 1], _WIDEST)
     driven, ratios = _driven(covering, parameters, poses_from_angles(skeleton, angles))
     whole = bending.whole(amplitudes)
-    before = whole.rest_volume()
-    for frame, joints in enumerate(ranks):  # one at a time, which bounds memory
-        one = slice(frame, frame + 1)
-        swollen = whole.swollen(driven[one], bending.swellings @ (ratios[one] * amplitudes).T)
-        without, with_swelling = (float(swollen.volume(amplitude)[0]) - before for amplitude in (0.0, 1.0))
+    before = whole.rest_volume(bending.rest)
+    together = max(_POINTS // len(bending.rest), 1)
+    changes = []
+    for first in range(0, len(ranks), together):
+        some = slice(first, first + together)
+        parts = BentParts([whole], [first], len(ranks[some]))
+        swelling = parts.swelling(packed, driven, bending.swellings @ (ratios[some] * amplitudes).T)
+        changes.append([swelling.volume_and_slope(np.array([one]))[0][0] - before for one in (0.0, 1.0)])
+    for joints, without, with_swelling in zip(ranks, *np.concatenate(changes, axis=1), strict=True):
         singly = float(lost[joints] @ lost[joints])
         slope, weight = with_swelling - without, len(joints)
         square = singly + weight * slope**2
