@@ -7,6 +7,7 @@ import math
 import pytest
 
 from warpjld.errors import InputError
+from warpjld.simulation.grip.bracket import Bracket
 from warpjld.simulation.grip.search import GripStatus, Trial, TrialOutcome, gentlest_grip
 
 
@@ -210,3 +211,21 @@ def test_what_slid_tells_how_firm_a_grip_has_to_be() -> None:
     assert found.status is GripStatus.HELD
     assert 1.5 <= found.trial.capacity <= 1.5 * 1.1
     assert len(found.trials) <= 4
+
+
+def test_a_slope_that_is_not_kept_is_not_followed() -> None:
+    """An object that turns away from a digit: its capacity stays below the target until the others have it, though its
+    derivative promises at every grip that the next hundredth reaches it."""
+    bracket, tried, grip = Bracket(0.0, 60.0, 1.08, 0.5), 0, 0.5
+    while tried < 30:
+        value = 0.8 if grip < 2.0 else 0.8 + 40.0 * (grip - 2.0)
+        tried += 1
+        if value >= 1.08:
+            break
+        bracket.note(grip, value, 40.0, enough=False)
+        ahead = bracket.next()
+        assert ahead is not None
+        assert ahead > grip
+        grip = ahead
+    assert tried <= 12  # 200 by slopes alone
+    assert grip < 4.0

@@ -25,6 +25,8 @@ _FARTHEST = 12.0
 """Longest step outside a bracket, over the default step."""
 _SHORTEST = 0.01
 """Shortest step outside a bracket, over the default step."""
+_KEPT, _LONGER = 0.25, 2.0
+"""Share of the rise that a slope promised below which slopes are not relied on, and the next step over the last one."""
 _POWER = 2.0
 """Assumed exponent of the value's growth since first contact, until two slopes are known."""
 _SLOW = 0.6
@@ -142,9 +144,23 @@ class Bracket:
         if known.ahead is not None:
             far = self._distance(known, self._below if above is None else self._above)
             if above is None:
+                far = max(far, self._overdue(known))
                 return known.grip + min(max(far, _SHORTEST * self._step), _FARTHEST * self._step)
             return known.grip + min(far, -_SHORTEST * self._step)
         return self._inward(known) if below is None else self._outward(known)
+
+    def _overdue(self, last: _Point) -> float:
+        """Twice the last step, if the value rose in it by much less than the slope at its start promised; else 0.
+
+        An object that rides along turns or slides away from a digit meanwhile, which no derivative tells: slopes alone
+        would lead to one small step after the other.
+        """
+        others = [one for one in self._below if one.grip < last.grip and one.slope is not None]
+        before = max(others, key=lambda one: one.grip, default=None)
+        if before is None or before.slope is None:
+            return 0.0
+        step = last.grip - before.grip
+        return _LONGER * step if last.value - before.value < _KEPT * before.slope * step else 0.0
 
     def _distance(self, known: _Point, side: list[_Point]) -> float:
         """Distance to the target extrapolated from a point and its nearest neighbour on the same side, if any."""
