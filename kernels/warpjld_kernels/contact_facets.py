@@ -1,4 +1,4 @@
-"""Broad phase of mortar contact: pairs of facets whose bounding boxes overlap, and which of them may touch."""
+"""Broad phase of mortar contact: facets whose bounding boxes overlap, and pairs of them that may face each other."""
 
 import warp as wp
 

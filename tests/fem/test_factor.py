@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
-from warpjld.fem import Body, HexMesh, LinearElastic, box_hexes, merge
+from warpjld.fem import Body, HexMesh, LinearElastic, SolveStatus, box_hexes, merge
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.solver.elimination import eliminate
 from warpjld.fem.solver.factor import CostlyError, Factor
+from warpjld.fem.solver.linear import LinearSolver
 
 
 def _stiffness(mesh: HexMesh) -> tuple[BlockMatrix, np.ndarray]:
@@ -111,3 +113,22 @@ def test_orders_are_complete_and_fill_is_low() -> None:
     assert sorted(done) == list(range(len(found.tables["first"]) - 1))
     dense = 3.0 * active.sum()
     assert found.work < 0.35 * dense**3 / 3.0
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 3.0])
+def test_beside_a_non_symmetric_part_of_few_rows(size: float) -> None:
+    mesh = box_hexes((1.0, 0.5, 0.7), (6, 3, 3))
+    matrix, free = _stiffness(mesh)
+    rng = np.random.default_rng(4)
+    rows = rng.choice(len(free), size=12, replace=False)
+    part = np.zeros((len(free), len(free)))
+    part[np.ix_(rows, rows)] = size * rng.normal(size=(12, 12))
+    right = rng.normal(size=len(free))
+    solver = LinearSolver(matrix, free, mesh, method="direct", threads=1)
+    done = solver.solve_nonsymmetric(csr_array(part), right, tolerance=1e-10, iterations=40)
+    want = np.linalg.solve(_dense(matrix, free) + part[np.ix_(free, free)], right[free])
+    assert done.status is SolveStatus.CONVERGED
+    assert done.residual <= 2e-10
+    assert done.iterations <= 13
+    assert (done.x[~free] == 0.0).all()
+    np.testing.assert_allclose(done.x[free], want, rtol=1e-6, atol=1e-7 * np.abs(want).max())

@@ -44,6 +44,21 @@ def test_derivatives_are_those_of_the_integrals() -> None:
             np.testing.assert_allclose(found[pair, k], difference, atol=2e-8)
 
 
+def test_no_pair_that_counts_is_sorted_out() -> None:
+    mesh, mortar = _blocks(5)
+    counts = len(mortar.slave.quads), len(mortar.master.quads)
+    every = np.stack(np.meshgrid(*(np.arange(n, dtype=np.int32) for n in counts), indexing="ij"), axis=2).reshape(-1, 2)
+    rng = np.random.default_rng(5)
+    for reach in (0.05, 0.3, 0.6):
+        x = mesh.nodes + 0.03 * rng.normal(size=mesh.nodes.shape)
+        found = mortar.integrals(every, mortar.slave.quads, mortar.master.quads, x, reach)
+        counted = found[:, 32] > 0.0
+        assert 0 < counted.sum() < 0.7 * len(every)
+        pairs, integrals = mortar._facing(x, reach)
+        assert pairs.tobytes() == every[counted].tobytes()
+        assert integrals.tobytes() == found[counted].tobytes()
+
+
 def test_points_do_not_depend_on_what_was_asked_before() -> None:
     mesh, mortar = _blocks(6)
     rng, reach = np.random.default_rng(3), 0.3

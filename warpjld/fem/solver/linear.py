@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
 from warpjld.errors import InputError
@@ -140,18 +142,48 @@ class LinearSolver:
         self, nonsymmetric: Any, b: Array, *, tolerance: float = 1e-8, iterations: int = 400
     ) -> Iteration:
         """Solution of (K11 + E11) x = b by flexible GMRES, for a matrix E (3N, 3N) that may be nonsymmetric and
-        indefinite; preconditioned as K is.
+        indefinite; preconditioned as K is. With a factor of K, the unknowns are y = E x, non-zero in few rows.
         """
         right = b * self._mask
         mask = self._mask
+        if self.method == "direct":
+            return self._beside_factor(csr_array(nonsymmetric), right, tolerance, iterations)
 
         def product(x: Array) -> Array:
             return self.masked_product(x) + mask * (nonsymmetric @ x)
 
         def precondition(r: Array) -> Array:
-            return self._factor.solve(r) if self.method == "direct" else np.asarray(self._precondition(r))
+            return np.asarray(self._precondition(r))
 
         return minimal_residuals(product, precondition, right, tolerance=tolerance, iterations=iterations)
+
+    def _beside_factor(self, nonsymmetric: Any, right: Array, tolerance: float, iterations: int) -> Iteration:
+        """Solution of (K11 + E11) x = b as x = K⁻¹ (b − y), (1 + E K⁻¹) y = E K⁻¹ b; both residuals are the same."""
+        mask, solve = self._mask, self._factor.solve
+        rows = np.flatnonzero(np.diff(nonsymmetric.indptr))
+        part = nonsymmetric[rows]
+
+        def whole(y: Array) -> Array:
+            out = np.zeros_like(right)
+            out[rows] = y
+            return out
+
+        def pushed(x: Array) -> Array:
+            return np.asarray(mask[rows] * (part @ x))
+
+        x = solve(right)
+        start, size = pushed(x), norm(right)
+        aim = tolerance * size
+        done = Iteration(start, SolveStatus.CONVERGED, 0, 0.0, np.empty(0))
+        if not norm(start) <= aim:
+            aim /= norm(start)
+            done = minimal_residuals(
+                lambda y: y + pushed(solve(whole(y))), lambda y: y, start, tolerance=aim, iterations=iterations
+            )
+            x = solve(right - whole(done.x))
+        left = norm(right - self.masked_product(x) - mask * (nonsymmetric @ x)) / max(size, 1e-300)
+        status = done.status if np.isfinite(left) else SolveStatus.NOT_FINITE
+        return replace(done, x=x, status=status, residual=left)
 
     def masked_product(self, x: NDArray[Any]) -> NDArray[Any]:
         """Product K11 x."""
