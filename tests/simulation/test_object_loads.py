@@ -67,6 +67,7 @@ def test_a_bar_that_turns_is_pulled_by_its_own_weight() -> None:
 
 def test_a_stress_at_rest_relaxes() -> None:
     found = run(BAR + "PRESTRESS BAR 0 5000 0\n")
+    assert found.frames.tolist() == [1.0, 2.0]  # it acts from the first frame on, as loads do
     assert stretch(found) == pytest.approx(-5000.0 / YOUNG * LENGTH, rel=1e-3)
 
 
