@@ -60,6 +60,7 @@ def test_rigs_come_from_files(data) -> None:
         ("INITIAL index.knuckle2 FLEXION", "1:31", "expected the angle at rest in degrees"),
         ("WRIST LEFT FLEXION AT 0 3\nINITIAL index.knuckle2 FLEXION 10", "2:1", "INITIAL comes before its keys"),
         ("LIMIT index.base FLEXION 50 40", "1:29", "must not be below the smallest (50)"),
+        ("INITIAL index.base FLEXION 40\nLIMIT index.base FLEXION 0 30", "2:28", "initial flexion 40° is beyond"),
         ("PARAMETER index.base PROXIMITY 0.9 0.9", "1:22", "sum to 1.2; at most 1 (C21)"),
         ("PARAMETER index.base PROXIMITY 0.9", "1:35", "expected value 2 of 2 for PROXIMITY"),
         ("PARAMETER index.base PEAK 1", "1:22", "must lie between 0 and 1"),

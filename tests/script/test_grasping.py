@@ -174,6 +174,10 @@ def test_the_summary_tells_objects_searches_and_contacts(run, tmp_path: Path) ->
         ("OBJECT a BALL\nOBJECTS a INDEX LEFT KNUCKLES2 10 5", "must not come before"),
         ("OBJECT a BALL\nOBJECTS a JOINT wrist 1 5\nOBJECTS a JOINT index.base 4 6", "follows another joint"),
         ("OBJECT a BALL\nAUTO_F_1 1 LEFT INDEX 99999999 a NEAREST", "or less"),
+        (
+            "OBJECT a BALL\nAUTO_F_2_3 1 LEFT INDEX KNUCKLES3 0 a NEAREST",
+            "vertex 0 does not move when left.index.knuckle3",
+        ),
         ("OBJECT a BALL\nAUTO_F_1 1 LEFT INDEX PAD a 5120", "has facets 0 to 5119, got 5120"),
         ("OBJECT a BALL\nAUTO_F_1 1 LEFT INDEX PAD a NEAREST WITHIN 0", "how exactly, in metres must be 1e-07 or more"),
         ("OBJECT a BALL\nAUTO_WRIST 1 LEFT PAD a NEAREST WITHIN", "expected how exactly, in metres"),

@@ -82,6 +82,14 @@ def test_wrong_input(run, line: str, says: str) -> None:
         run(line)
 
 
+def test_a_segment_of_the_other_hand_is_that_hands(run, scene) -> None:
+    """The right hand came last, and is the current actor."""
+    run("HAND RIGHT BUILTIN RESOLUTION 1500\nOBJECT block BOX 0.2 0.02 0.2 AT 0 -0.02 -0.15")
+    run("SHOW INTERSECTION 0 left.index block\nSHOW INTERSECTION 0 right.index block\nSHOW INTERSECTION 0 index block")
+    left, right, current = (said.split()[0] for said in scene.said[-3:])
+    assert (left, right, current) == ("LEFT", "RIGHT", "RIGHT")
+
+
 def test_a_picture_with_numbers(run, tmp_path: Path) -> None:
     scene = run("CAMERA DORSAL\nPICTURE 0 'plain.png'\nPICTURE 0 'numbers.png' NUMBERS LEFT\nSIZE 400 300")
     run_scene(scene, tmp_path)

@@ -49,8 +49,12 @@ def test_a_bar_is_pulled_by_its_end(load: str, within: float) -> None:
 
 
 def test_loads_follow_their_keys() -> None:
-    found = run(BAR + "SPLINE 0 0 0\nFORCE BAR TOP AT 0 0 0 0\nFORCE BAR TOP AT 2 0 1 0\n")
+    found = run(BAR + "FORCE BAR FOOT AT 0 0 1 0\nSPLINE 0 0 0\nFORCE BAR TOP AT 0 0 0 0\nFORCE BAR TOP AT 2 0 1 0\n")
     assert stretch(found, 0) == pytest.approx(0.5 * stretch(found, 1), rel=1e-3)
+    # a force on what is held does nothing, which is told
+    assert [note for note in found.notes if "force" in note] == [
+        "BAR: the force on points FOOT deforms nothing: they are all held"
+    ]
 
 
 def test_a_bar_that_turns_is_pulled_by_its_own_weight() -> None:
@@ -63,6 +67,7 @@ def test_a_bar_that_turns_is_pulled_by_its_own_weight() -> None:
 
 def test_a_stress_at_rest_relaxes() -> None:
     found = run(BAR + "PRESTRESS BAR 0 5000 0\n")
+    assert found.frames.tolist() == [1.0, 2.0]  # it acts from the first frame on, as loads do
     assert stretch(found) == pytest.approx(-5000.0 / YOUNG * LENGTH, rel=1e-3)
 
 

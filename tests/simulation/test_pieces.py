@@ -105,6 +105,7 @@ def test_what_cannot_be_cut(bar: Path) -> None:
         (box + "PIECES bar 1", "number of pieces must be 2 or more"),
         (box + "PIECES rod 3", "there is no object rod"),
         (box + "MOVE bar 0 0 1 0\nPIECES bar 3", "cut it first, then move its pieces"),
+        (box + "PHYSICAL bar OF RUBBER HOLLOW 0.002\nPIECES bar 2", "BAR is HOLLOW, and a wall across the cut"),
         (box + "PIECES bar REGIONS", "bar has no regions"),
         (box + "PHYSICAL bar REGION core YOUNG 1e5", "it is from no volume file"),
         (f'OBJECT bar "{bar}"\nPHYSICAL bar REGION region3 YOUNG 1e5', "has no region region3"),

@@ -16,6 +16,10 @@ __all__ = ["Part", "Surface", "one_uv_a_vertex", "weld_surface"]
 
 _NO_AREA = 1e-12  # of a triangle, per square of the surface's size: what double precision makes of a line
 _SEAM = 1e-6  # relative to the surface's size: border vertices of two parts nearer than this coincide (float32 files)
+_GAP = 2.5e-4
+"""Relative to the surface's size: border vertices of two parts that are farther apart than this never coincide, half a
+millimetre of a body: files with few decimals, and parts with frames of their own, leave such gaps."""
+_OF_EDGE = 0.05  # largest gap between them per length of the shortest border edge there: none of the border is lost
 
 
 @dataclass(frozen=True)
@@ -189,7 +193,7 @@ def weld_surface(
             first = np.unique(label, return_index=True)[1]
             owner[part.vertices] = part.vertices.start + first[label]
     if len(parts) > 1:
-        owner = _joined_borders(points, owner[triangles], owner, parts, joins, _SEAM * size)
+        owner = _joined_borders(points, owner[triangles], owner, parts, joins, size)
     kept, weld = np.unique(owner, return_inverse=True)
     welded = weld[triangles]
     solid = (welded[:, 0] != welded[:, 1]) & (welded[:, 1] != welded[:, 2]) & (welded[:, 2] != welded[:, 0])
@@ -220,7 +224,7 @@ def _joined_borders(
     owner: NDArray[np.int64],
     parts: tuple[Part, ...],
     joins: NDArray[np.bool_] | None,
-    distance: float,
+    size: float,
 ) -> NDArray[np.int64]:
     """Representative vertex of each, shape (W,), after welding the borders of different parts.
 
@@ -230,15 +234,21 @@ def _joined_borders(
         owner: Representative vertex of each before that, shape (W,).
         parts: The source's meshes.
         joins: Vertices that may be welded to another part's, shape (W,); None for all.
-        distance: Largest distance of welded vertices [m].
+        size: Diagonal of the surface's bounding box [m].
     """
     solid = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
     half = np.sort(np.concatenate([solid[:, [0, 1]], solid[:, [1, 2]], solid[:, [2, 0]]]), axis=1)
     keys, times = np.unique(half[:, 0] * len(points) + half[:, 1], return_counts=True)
-    border = np.unique(np.stack(np.divmod(keys[times == 1], len(points))))
+    edges = np.stack(np.divmod(keys[times == 1], len(points)), axis=1)
+    border = np.unique(edges)
     if joins is not None:
         border = border[joins[border]]
-    pairs = border[close_links(points[border], max(distance, 1e-12))]
+    shortest = np.full(len(points), np.inf)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    np.minimum.at(shortest, edges, lengths[:, None])
+    pairs = border[close_links(points[border], max(_GAP * size, 1e-12))]
+    apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    pairs = pairs[apart <= np.maximum(_SEAM * size, _OF_EDGE * shortest[pairs].min(axis=1))]
     part = np.zeros(len(points), dtype=np.int64)
     for k, mesh in enumerate(parts):
         part[mesh.vertices] = k

@@ -22,10 +22,20 @@ if TYPE_CHECKING:
     from warpjld.script.props import Prop
     from warpjld.script.scene import Actor, Scene
 
-__all__ = ["Attempt", "close_digits", "collisions", "contact_reports", "placed_at", "posture", "search_flexion"]
+__all__ = [
+    "Attempt",
+    "close_digits",
+    "collisions",
+    "contact_reports",
+    "moves_vertex",
+    "placed_at",
+    "posture",
+    "search_flexion",
+]
 
 
 _LOOKS = 6  # frames of a closing motion at which collisions with other objects are tested
+_STILL = 1e-6  # what moves less by a bend of half a radian does not move: rounding of single precision [m]
 
 
 @dataclass(frozen=True)
@@ -74,6 +84,17 @@ def placed_at(scene: Scene, prop: Prop, key: float) -> GraspObject:
     there = prop_places(scene.actors, scene.rate, prop, np.array([key]))
     thing = replace(prop.thing, vertices=prop.shape(key)) if prop.deforms else prop.thing
     return thing.placed(there.position[0], there.rotation[0])
+
+
+def moves_vertex(scene: Scene, actor: Actor, key: float, joint: int, vertex: int) -> bool:
+    """Whether a welded vertex of the actor's surface moves when a joint bends at a frame."""
+    from warpjld.skeleton import poses_from_angles
+
+    _, angles = posture(scene, actor, key)
+    bent = np.repeat(angles, 2, axis=0)
+    bent[1, joint, 0] += 0.5
+    first, last = cover(actor).points(poses_from_angles(actor.skeleton, bent), [vertex])[:, 0]
+    return bool(np.linalg.norm(last - first) > _STILL)
 
 
 def search_flexion(

@@ -22,7 +22,7 @@ from warpjld.simulation.solve.start_frame import StartFrame, find_start
 from warpjld.simulation.solve_result import SolveResult
 from warpjld.simulation.specification import BondStrength, ContactSpecification, SolveSpecification
 
-__all__ = ["after_contact", "before_contact", "let_go", "rests_rigidly"]
+__all__ = ["after_contact", "before_contact", "let_go"]
 
 
 def before_contact(
@@ -80,7 +80,8 @@ def let_go(solved: SolveResult, specification: ContactSpecification, request: So
 
 
 def after_contact(solved: SolveResult, before: StartFrame) -> tuple[StartFrame, SolveResult]:
-    """Add what fell during the contact solve, or after it where it could not go on.
+    """Add what fell during the contact solve, or after it where it could not go on. What rests and could not be solved
+    at all stays rigid.
 
     Returns:
         The start frame extended by the falls, and the result with ``released`` set; both unchanged if nothing
@@ -88,6 +89,9 @@ def after_contact(solved: SolveResult, before: StartFrame) -> tuple[StartFrame, 
     """
     if before.interrupted is not None:
         return before, _stopped(solved, before.interrupted)
+    if rigid := _rests_rigidly(solved, before):
+        before = replace(before, falls=(*before.falls, rigid))
+        solved = replace(solved, status=SolveStatus.CONVERGED, message=SolveStatus.CONVERGED.value, unsolved=None)
     found = [*solved.falls, *([] if solved.unsolved is None else [solved.unsolved])]
     found = [falls for falls in found if any(path.summary() for path in falls.paths.values())]
     moved, said = dict(before.moved), list(before.falls)
@@ -119,7 +123,7 @@ def _bonds_left(solved: SolveResult, specification: ContactSpecification) -> lis
     return [bond for bond in specification.bonds if {bond.one, bond.other} not in parted]
 
 
-def rests_rigidly(solved: SolveResult, before: StartFrame) -> str:
+def _rests_rigidly(solved: SolveResult, before: StartFrame) -> str:
     """Reason why fallen bodies at rest are shown rigid: how they give way to their own weight was not found.
 
     Returns:

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
-from warpjld.fem import MaterialWarning, SolveStatus
+from warpjld.fem import MaterialWarning
 from warpjld.fem.contact import ContactWarning
 from warpjld.fem.hand.suggestions import DigitSlopes
 from warpjld.runtime.threads import one_blas_thread
@@ -40,7 +40,7 @@ from warpjld.simulation.bodies.skin_obstacle import bystanders
 from warpjld.simulation.display.solved_surfaces import surfaces_of_frames, view_of_frames
 from warpjld.simulation.display.surfaces import DeformedSurfaces
 from warpjld.simulation.display.visible_pressure import VisiblePressure
-from warpjld.simulation.free_fall import after_contact, before_contact, let_go, rests_rigidly
+from warpjld.simulation.free_fall import after_contact, before_contact, let_go
 from warpjld.simulation.grip.correct_frames import worst_digits
 from warpjld.simulation.grip.found import FoundGrip
 from warpjld.simulation.report.parted import parted_notes
@@ -278,9 +278,6 @@ def simulate(
             saving=lambda save: keeping(lambda: checkpoint.path if save(checkpoint) else None),
             progress=progress,
         )
-    if rigid := rests_rigidly(solved, before):
-        before = replace(before, falls=(*before.falls, rigid))
-        solved = replace(solved, status=SolveStatus.CONVERGED, message=SolveStatus.CONVERGED.value, unsolved=None)
     before, solved = after_contact(solved, before)
     return _report(solved, before, table, request, notes)
 

@@ -178,7 +178,12 @@ def limit(scene: Scene, arguments: Arguments) -> None:
         raise arguments.error(f"the largest angle must not be below the smallest ({low:g}), got {high:g}")
     limits = chosen.skeleton.limits.copy()
     limits[joint, CHANNELS.index(channel.lower())] = math.radians(low), math.radians(high)
-    chosen.skeleton = replace(chosen.skeleton, limits=limits)
+    limited = replace(chosen.skeleton, limits=limits)
+    try:
+        check_initial(limited)
+    except InputError as error:
+        raise arguments.error(error.message) from None
+    chosen.skeleton = limited
 
 
 @command(

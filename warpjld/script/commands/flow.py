@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from warpjld.errors import InputError
 from warpjld.script import show
 from warpjld.script.arguments import Arguments
@@ -96,6 +98,10 @@ def _measure(scene: Scene, arguments: Arguments, topic: str) -> None:
             scene.say(measures.distance(scene, actor, frame, vertex, prop, facet))
         return
     segment, where = arguments.name("a segment or a digit"), arguments.last
+    side = segment.lower().partition(".")[0]
+    if side in ("left", "right") and segment.lower() != side:
+        with suppress(InputError):  # what the current actor does not have is told below
+            actor = scene.actor_with(side)
     prop = read_object(scene, arguments)
     if scene.dry:
         return

@@ -216,7 +216,7 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
     from warpjld.grasp.digits import pad_vertex
     from warpjld.grasp.search import FINEST
     from warpjld.script.binding import cover
-    from warpjld.script.grasping import Attempt, search_flexion
+    from warpjld.script.grasping import Attempt, moves_vertex, search_flexion
 
     actor = scene.actor_with(side)
     joint = named_joint(actor, f"{side}.{joint_name}", arguments)
@@ -224,6 +224,7 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
         vertex = -1 if scene.dry else pad_vertex(cover(actor), f"{side}.{finger}".lower())
     else:
         vertex = read_vertex(actor, arguments, "the hand vertex (its number in the file, or PAD)")
+    where = arguments.last
     prop = read_object(scene, arguments)
     _check_size(actor, prop, arguments)
     if arguments.keyword("NEAREST"):
@@ -238,6 +239,11 @@ def _search(scene: Scene, arguments: Arguments, name: str, key: float, side: str
     if scene.dry:
         actor.set_keys(f"{actor.skeleton.names[joint]}.{CHANNELS[0]}", [key], 0.0, scene.spline)
         return
+    if not moves_vertex(scene, actor, key, joint, vertex):
+        number, bends = int(actor.rig.surface.numbers[vertex]), actor.skeleton.names[joint]
+        raise arguments.error(
+            f"{actor.name} vertex {number} does not move when {bends} bends: want one that does", where
+        )
     found, inside = search_flexion(scene, actor, prop, key, joint, vertex, facet, distance, within)
     status = SearchStatus(int(found.status[0]))
     message = found.message()

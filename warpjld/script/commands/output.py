@@ -108,7 +108,7 @@ def picture(scene: Scene, arguments: Arguments) -> None:
 @command(
     "FILM",
     syntax=f'FILM "<name>{"/".join(FILMS)}" [SHOTS <shot> …] {_SHOWN}',
-    help="A film of all frames, or of shots in the order given.",
+    help="A film of all frames, or of shots, each after the one before in time.",
     group="Output",
 )
 def film(scene: Scene, arguments: Arguments) -> None:

@@ -43,6 +43,13 @@ def pieces(scene: Scene, arguments: Arguments) -> None:
         raise arguments.error(f"{prop.name} is deformed by key frames or by formula: it cannot be cut")
     if prop.placement.tracks or prop.associations or _is_named(scene, prop.name):
         raise arguments.error(f"{prop.name} is moved, bonded or held already: cut it first, then move its pieces")
+    physical = scene.contact.physical.get(prop.name)
+    if physical is not None and physical.wall > 0.0:
+        raise arguments.error(
+            f"{prop.name} is HOLLOW, and a wall across the cut would close each piece: cut it as a solid, then make "
+            f"pieces HOLLOW (PHYSICAL {prop.name}_1 … HOLLOW) if such walls are meant",
+            where,
+        )
     regions = arguments.keyword("REGIONS") is not None
     count = 0 if regions else arguments.integer("the number of pieces", minimum=2, maximum=_MOST)
     options = arguments.options(

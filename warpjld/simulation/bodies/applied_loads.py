@@ -13,7 +13,7 @@ from warpjld.fem import Centrifugal, HexMesh, Loads
 from warpjld.simulation.object_loads import ObjectLoad, ObjectSpin
 from warpjld.simulation.specification import ContactSpecification
 
-__all__ = ["AppliedLoads", "applied_loads"]
+__all__ = ["AppliedLoads", "applied_loads", "idle_forces"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +59,19 @@ class AppliedLoads:
             traction={**loads.traction, **traction},
             centrifugal=turns or None,
         )
+
+
+def idle_forces(contact: ContactSpecification, loads: AppliedLoads, held: NDArray[np.int64]) -> tuple[str, ...]:
+    """Notes on forces that deform nothing, since all their nodes are held.
+
+    Args:
+        contact: Specification with the forces.
+        loads: The same, applied to the object's mesh.
+        held: Nodes that are held to the end.
+    """
+    named = [points for one, points, kind in contact.loads if one == loads.name and kind == "force"]
+    idle = [points for points, (_, nodes) in zip(named, loads.nodal, strict=True) if np.isin(nodes, held).all()]
+    return tuple(f"the force on points {points} deforms nothing: they are all held" for points in idle)
 
 
 def applied_loads(

@@ -16,7 +16,7 @@ from warpjld.fem import Prescribed
 from warpjld.fem.load.loads import volumes
 from warpjld.grasp import Places
 from warpjld.simulation.animation import ObjectAnimation
-from warpjld.simulation.bodies.applied_loads import AppliedLoads, applied_loads
+from warpjld.simulation.bodies.applied_loads import AppliedLoads, applied_loads, idle_forces
 from warpjld.simulation.bodies.deformable_body import DeformableBody, History, Surroundings
 from warpjld.simulation.bodies.object_mesh import ObjectMesh, mesh_object
 from warpjld.simulation.bodies.support import ObjectSupport
@@ -201,7 +201,9 @@ def build_object_body(
                 foot = _foot(volume.mesh.nodes, support.axis, "lower" if contact.pull[support.axis] < 0.0 else "upper")
                 states.append((PrescribedPoints(foot, held=True), foot.choose(volume.mesh.nodes, volume.mesh.nodes)))
         loads, mesh = applied_loads(contact, name, volume.mesh, volume.local)
-        volume = replace(volume, mesh=mesh)
+        held = [nodes for one, nodes in states if one.held and np.isinf(one.until)]
+        idle = idle_forces(contact, loads, np.concatenate([np.empty(0, dtype=np.int64), *held]))
+        volume = replace(volume, mesh=mesh, notes=(*volume.notes, *idle))
     except InputError as error:
         raise located(InputError(f"{name}: {error.message}"), physical.where) from error
     return replace(object_body(volume, at, states, start, support), loads=loads)

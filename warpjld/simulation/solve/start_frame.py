@@ -90,7 +90,14 @@ def find_start(
     keyed = any(state.tracks for state in contact.prescribed.values())
     # a supported object deforms so little under its weight that this can be left to the first solved step
     bends = any(flesh.flexion for flesh in contact.flesh.values())
-    if keyed or bends or contact.loaded or (any(contact.gravity) and not fell and (free or not contact.grips)):
+    strained = any(any(matter.prestress) for name, matter in contact.physical.items() if name in stands)
+    if (
+        keyed
+        or bends
+        or strained
+        or contact.loaded
+        or (any(contact.gravity) and not fell and (free or not contact.grips))
+    ):
         return StartFrame(float(request.first), {})
     return _Approach(animation, contact, free).start(request)
 
