@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpjld.files.kept_files import kept_folder
 from warpjld.runtime.ahead import Ahead, LostError
 from warpjld.runtime.threads import cores
 
@@ -41,6 +43,8 @@ class ReadAhead:
 
     def __init__(self, rig: str, how: dict[str, Any], motion: Path, reading: dict[str, Any]) -> None:
         self._ahead: Ahead | None = None
+        if "warp" in sys.modules:  # nothing is left to import meanwhile
+            return
         files = (Path(rig), motion)
         small = all(file.is_file() for file in files) and sum(file.stat().st_size for file in files) <= _LARGEST
         if small and cores() > 1:
@@ -49,14 +53,14 @@ class ReadAhead:
     def rig(self) -> Rig | None:
         """The rig; None where it must be read here.
 
-        While it is not there, modules are imported that binding it will need.
+        While it is not there, modules are imported that binding it will surely need.
 
         Raises:
             InputError: As of ``load_rig``.
         """
         if self._ahead is None:
             return None
-        for name in _TO_BIND:
+        for name in _TO_BIND if _binds() else ():
             if not self._ahead.ready():
                 import_module(name)
         rig: Rig | None = self._item()
@@ -83,6 +87,12 @@ class ReadAhead:
         except LostError:
             self.end()
             return None
+
+
+def _binds() -> bool:
+    """Whether the cache holds nothing, so that a surface is surely bound."""
+    folder = kept_folder()
+    return folder is None or next(folder.glob("*.npz"), None) is None
 
 
 def rig_and_motion(
