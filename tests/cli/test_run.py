@@ -144,9 +144,9 @@ def test_an_interrupted_run_leaves_nothing(tmp_path, number) -> None:
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=_environment()) as process:
         try:
             deadline = time.monotonic() + 60
-            while not any(out.glob(".making-*/long*")) and time.monotonic() < deadline:
+            while not any(out.glob(".making*/.long*")) and time.monotonic() < deadline:
                 time.sleep(0.05)
-            assert any(out.glob(".making-*/long*")), "the film was begun"
+            assert any(out.glob(".making*/.long*")), "the film was begun"
             process.send_signal(number)
             error = process.communicate(timeout=30)[1]
         finally:

@@ -86,13 +86,19 @@ def command_group(limits: tuple[str, ...]) -> None:
         set_limit(name.strip(), value)
 
 
+def _terminated(number: int, frame: object) -> None:
+    """SIGTERM cleans up as Ctrl-C does, and keeps finished results. Those that follow, as where a group of processes is
+    ended and each of them passes it on, do not cut that off."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line.
 
     Exit codes: 0 done, 1 bad input or a failed job, 2 wrong usage, 70 a bug in the program, 130 interrupted.
     """
-    # SIGTERM cleans up as Ctrl-C does, and keeps finished results
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, _terminated)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # file names may not be valid text
     try:
