@@ -43,12 +43,6 @@ class Driven:
     turns: NDArray[np.float64]
     scalars: NDArray[np.float64]
 
-    def __len__(self) -> int:
-        return len(self.positions)
-
-    def __getitem__(self, frames: NDArray[np.int64] | slice) -> Driven:
-        return Driven(self.positions[frames], self.turns[frames], self.scalars[frames])
-
 
 @dataclass(frozen=True, eq=False)
 class BentPart:

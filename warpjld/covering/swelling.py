@@ -71,16 +71,16 @@ def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.
         return amplitudes, factors
     angles = [_measured(skeleton, int(joint), largest[joint]) for joint in joints]
     poses = poses_from_angles(skeleton, np.concatenate(angles))
-    last = np.cumsum([len(a) for a in angles])
+    counts = np.array([len(a) for a in angles], dtype=np.int64)
+    first = np.cumsum(counts) - counts
     default = default_parameters(skeleton)
     parameters = replace(covering.parameters, inflation=default.inflation, muscle=default.muscle, palm=default.palm)
     rows = rows_of(covering.fields, skeleton, covering.anchors, parameters)
     bending, packed = Bending(covering, rows), PackedRows(rows)
     driven, ratios = _driven(covering, parameters, poses)
-    first = last - [len(a) for a in angles]
-    for some in _together_at_once(bending, joints, [len(a) for a in angles]):
+    for some in _groups(bending, joints, counts):
         numbers, found = zip(*some, strict=True)
-        chosen, begin, frames = joints[list(numbers)], first[list(numbers)], len(angles[numbers[0]])
+        chosen, begin, frames = joints[list(numbers)], first[list(numbers)], int(counts[numbers[0]])
         parts = BentParts(found, begin, frames)
         driving = ratios[begin[:, None] + np.arange(frames), chosen[:, None]]  # (P, F)
         more = np.concatenate([p.swelling for p in found])[:, None] * driving[parts.owner]
@@ -97,15 +97,15 @@ def volume_keeping(covering: Covering) -> tuple[NDArray[np.float64], NDArray[np.
     return amplitudes * _together(covering, bending, packed, parameters, amplitudes, lost), factors
 
 
-def _together_at_once(
-    bending: Bending, joints: NDArray[np.int64], frames: list[int]
+def _groups(
+    bending: Bending, joints: NDArray[np.int64], frames: NDArray[np.int64]
 ) -> Iterator[list[tuple[int, BentPart]]]:
     """Numbers among the joints, and the parts that they bend, in groups of the same number of frames and bounded
     size; joints that bend nothing are left out."""
-    for count in sorted(set(frames)):
+    for count in np.unique(frames).tolist():
         group: list[tuple[int, BentPart]] = []
         size = 0
-        for number in np.flatnonzero(np.array(frames) == count).tolist():
+        for number in np.flatnonzero(frames == count).tolist():
             part = bending.around(int(joints[number]))
             if part is None:
                 continue

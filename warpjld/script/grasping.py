@@ -89,10 +89,11 @@ def placed_at(scene: Scene, prop: Prop, key: float) -> GraspObject:
 def moves_vertex(scene: Scene, actor: Actor, key: float, joint: int, vertex: int) -> bool:
     """Whether a welded vertex of the actor's surface moves when a joint bends at a frame."""
     from warpjld.skeleton import poses_from_angles
+    from warpjld.skeleton.channels import FLEXION
 
     _, angles = posture(scene, actor, key)
     bent = np.repeat(angles, 2, axis=0)
-    bent[1, joint, 0] += 0.5
+    bent[1, joint, FLEXION] += 0.5
     first, last = cover(actor).points(poses_from_angles(actor.skeleton, bent), [vertex])[:, 0]
     return bool(np.linalg.norm(last - first) > _STILL)
 
