@@ -203,7 +203,8 @@ def _lean_depth(solid: VoxelSolid) -> float:
 
 def _head(solid: VoxelSolid, surface: Array, points: Points) -> None:
     base = points["skull_base"]
-    skull = (solid.points[:, 1] > base[1]) & (np.abs(solid.points[:, 0]) < 0.09)
+    skull = (solid.points[:, 1] > base[1]) & (solid.points[:, 1] < 1.0 + solid.size)
+    skull &= np.abs(solid.points[:, 0]) < 0.09
     crown = float(solid.points[skull, 1].max())
     radius = min(float(solid.depth[skull].max()), 0.6 * (crown - base[1]))
     top = solid.points[skull & (np.abs(solid.points[:, 1] - (crown - radius)) < 1.2 * solid.size)].mean(axis=0)
