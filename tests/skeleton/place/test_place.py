@@ -10,12 +10,15 @@ import trimesh
 from click.testing import CliRunner
 
 from warpjld.cli.place import place_command
+from warpjld.covering.surface_binding import bind_rig
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
 from warpjld.skeleton.actor import actor_skeleton
 from warpjld.skeleton.actor_points import ACTOR_POINTS
+from warpjld.skeleton.channels import CHANNELS
 from warpjld.skeleton.hand import hand_joint_names
+from warpjld.skeleton.kinematics import poses_from_angles
 from warpjld.skeleton.place.place import propose_points
 
 
@@ -60,6 +63,38 @@ def test_a_belly_does_not_move_the_spine(figure, placed):
         points = propose_points(surface, figure.surface.faces)
         for name, place in placed.items():
             assert np.linalg.norm(points[name] - place) < 0.03, name
+
+
+def posed(rig, turns):
+    """A rig's surface and joints with some angles [degrees] by joint and channel."""
+    angles = np.zeros((1, len(rig.skeleton), 4))
+    for (joint, channel), degrees in turns.items():
+        angles[0, rig.skeleton.index(joint), CHANNELS.index(channel)] = np.radians(degrees)
+    poses = poses_from_angles(rig.skeleton, angles)
+    return bind_rig(rig).deform(poses)[0].astype(np.float64), dict(
+        zip(rig.skeleton.names, poses.positions[0], strict=True)
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "turns",
+    [
+        {("left.shoulder", "abduction"): 100.0, ("right.shoulder", "abduction"): 100.0},  # hands above the head
+        {("left.hip", "flexion"): 25.0, ("right.hip", "flexion"): -15.0},  # a stride
+    ],
+    ids=["raised", "stride"],
+)
+def test_poses_of_a_body(figure, turns):
+    """Raised arms ended in a traceback, a stride turned the body's left."""
+    surface, truth = posed(figure, turns)
+    points = propose_points(surface, figure.surface.faces)
+    off = {name: np.linalg.norm(place - truth[name]) for name, place in points.items() if name in truth}
+    assert len(off) > 60
+    assert np.mean(list(off.values())) < 0.02
+    assert max(off.values()) < 0.06
+    raised = truth["left.middle.tip"][1] > truth["head.top"][1]
+    assert raised == (("left.shoulder", "abduction") in turns)
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,8 @@ _UPS = ((1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0))
 """Candidates for the up axis: (axis, sign), the usual ones first."""
 _LEGS = (0.12, 0.2, 0.28, 0.36)  # heights, as shares of the whole, at which two legs are expected
 _LEG_RATIO = 1.6  # largest ratio of the two legs' section areas
+_HIPS = 0.5  # height of the hips
+_HIPS_LEAST = 0.3  # least distance of the hips, per distance of the thighs, for their direction to be known
 _MIDLINE = 0.04  # half the width of what counts as the middle, in heights of all there is
 _LOWEST_CROWN = 0.6  # least height of the crown, as a share of the height of all there is
 _TRUNK = (0.56, 0.64)  # heights at which one trunk is expected
@@ -91,6 +93,30 @@ def _apart(legs: Sequence[Sequence[Array]], up: Array) -> Array:
     return np.asarray(apart - up * (up @ apart))
 
 
+def _hips_apart(legs: Sequence[Sequence[Array]], up: Array) -> Array:
+    """Horizontal vector from hip to hip: that between the thighs, extrapolated, so that a stride does not turn it."""
+    lower, upper = (_apart([legs[0], legs[k]], up) * 2.0 - _apart([legs[0]], up) for k in (-2, -1))
+    share = (_HIPS - _LEGS[-1]) / (_LEGS[-1] - _LEGS[-2])
+    hips = upper + share * (upper - lower)
+    return hips if hips @ upper > _HIPS_LEAST * float(upper @ upper) else _apart(legs, up)
+
+
+def _toes_ahead(points: Array, share: Array, ankles: Sequence[Array], forward: Array) -> float:
+    """How much farther feet reach ahead of their ankles than behind them, both feet together."""
+    low = np.flatnonzero(share < _LEGS[0])
+    own = np.argmin([np.linalg.norm(points[low] - ankle, axis=1) for ankle in ankles], axis=0)
+    out = 0.0
+    for k in range(len(ankles)):
+        one = low[own == k]
+        if not len(one):
+            continue
+        above, ahead = share[one] - share[one].min(), points[one] @ forward  # a foot of a stride may be in the air
+        foot, ankle = ahead[above < 0.03], ahead[(above > 0.05) & (above < 0.1)]
+        if len(ankle):
+            out += float(foot.max() + foot.min() - 2.0 * np.median(ankle))
+    return out
+
+
 def _stance_along(solid: VoxelSolid, up: Array) -> Stance | None:
     high = solid.points @ up
     low, height = float(high.min()), float(np.ptp(high))
@@ -115,15 +141,13 @@ def _stance_along(solid: VoxelSolid, up: Array) -> Stance | None:
             return None
         trunk.append(solid.points[found[0]].mean(axis=0))
     apart = _apart(legs, up)
-    left = unit(apart)
+    left = unit(_hips_apart(legs, up))
     middle = np.mean([np.mean(pair, axis=0) for pair in legs], axis=0)
     centre = np.mean(trunk, axis=0)
     if abs(float((centre - middle) @ left)) > 0.35 * float(apart @ left):  # the trunk stands between the legs
         return None
     forward = np.cross(left, up)
-    feet = solid.points[share < 0.03] @ forward
-    ankles = solid.points[(share > 0.05) & (share < 0.1)] @ forward
-    if (feet.max() - np.median(ankles)) < (np.median(ankles) - feet.min()):
+    if _toes_ahead(solid.points, share, legs[0], forward) < 0.0:
         left, forward = -left, -forward
     origin = centre + up * (low - float(centre @ up))
     return Stance(np.stack([left, up, forward]), origin, height)
