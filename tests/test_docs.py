@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from enum import Enum
 from functools import cache
 from pathlib import Path
 
+import click
 import pytest
 
 import warpjld
+from warpjld.script.registry import Command
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -79,9 +82,55 @@ def test_tests_that_stand_for_requirements_exist() -> None:
 def test_every_requirement_has_a_test_or_says_why_not() -> None:
     page = (DOCS / "reference" / "requirements.md").read_text(encoding="utf-8")
     empty = [
-        row for row in re.findall(r"^\| (R\d+[^|]*) \|[^|]*\| *\|$", page, flags=re.M) if row.strip() != "R115–R116"
+        row
+        for row in re.findall(r"^\| (R\d+[^|]*) \|[^|]*\|[^|]*\| *\|$", page, flags=re.M)
+        if row.strip() != "R115–R116"
     ]
     assert empty == []
+
+
+def test_what_meets_a_requirement_exists() -> None:
+    """Commands, their options, programs and functions of the third column."""
+    from warpjld.cli import command_group
+    from warpjld.script.registry import all_commands
+
+    commands = {one.name: one for one in all_commands()}
+    programs = command_group.list_commands(click.Context(command_group))
+    page = (DOCS / "reference" / "requirements.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (R\d+)[^|]* \| (?:[^|]|\\\|)*? \| ([^|]*?) ?\| [^|]*\|$", page, flags=re.M)
+    assert len(rows) > 120
+    gone = []
+    for number, cell in rows:
+        names = re.findall(r"`([^`]+)`", cell)
+        if not names and cell != "*none*" and number != "R115":
+            gone.append(f"{number}: nothing is named")
+        gone += [f"{number}: {name}" for name in names if not _there(name, commands, programs)]
+    assert gone == []
+
+
+def _there(name: str, commands: Mapping[str, Command], programs: Collection[str]) -> bool:
+    """Whether a command with its option, a program, or a dotted name exists."""
+    if name.startswith("warpjld "):
+        return name.split()[1] in programs
+    if name[0].isupper():
+        first, *options = [word for word in name.split() if word != "…"]
+        known = first in commands and set(re.findall(r"[A-Z][A-Z0-9_-]+", commands[first].syntax))
+        return bool(known) and set(options) <= known
+    parts = name.split(".") if name.startswith("warpjld_kernels.") else ["warpjld", *name.split(".")]
+    for count in range(len(parts), 0, -1):
+        if importlib.util.find_spec(parts[0]) and _is_module(parts[:count]):
+            found: object = importlib.import_module(".".join(parts[:count]))
+            for part in parts[count:]:
+                found = getattr(found, part, None)
+            return found is not None
+    return False
+
+
+def _is_module(parts: Sequence[str]) -> bool:
+    try:
+        return importlib.util.find_spec(".".join(parts)) is not None
+    except ModuleNotFoundError:
+        return False
 
 
 def anchor(heading: str) -> str:

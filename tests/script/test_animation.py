@@ -123,6 +123,17 @@ def test_errors_point_at_the_word(run, line: str, place: str, says: str) -> None
     assert says in str(caught.value)
 
 
+def test_ten_joints_of_a_hand_have_flexion_only(run) -> None:
+    """All of R7 but the bases of digits (R9)."""
+    digits = ("pinky", "ring", "middle", "index", "thumb")
+    ten = [f"{digit}.{joint}" for digit in digits for joint in ("knuckle2", "knuckle3")]
+    for joint in (*ten, "ring.carpometacarpal", "pinky.carpometacarpal"):
+        run(f"JOINT left.{joint} FLEXION AT 1 5")
+        for channel in ("PIVOT", "TWISTING", "ABDUCTION"):
+            with pytest.raises(InputError, match=f"left.{joint} has no {channel.lower()}"):
+                run(f"JOINT left.{joint} {channel} AT 1 5")
+
+
 def test_limits_can_be_changed(run) -> None:
     scene = run("LIMIT index.base FLEXION -10 110\nFINGER1 LEFT INDEX FLEXION AT 0 105")
     assert keys(scene, "left.index.base.flexion") == {0: 105}

@@ -13,6 +13,7 @@ from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.directing import camera_at, shot_at
 from warpjld.script.runner import run_scene
+from warpjld.script.staging import frame_numbers
 
 STAGE = "OBJECT CUBE BOX 0.1 0.1 0.1 COLOR 'white'\nFRAMES 0 8\nSIZE 80 60\n"
 WAY = "CAMERA FROM 0 0 1 TO 0 0 0 AT 0\nCAMERA FROM 1 0 1 TO 0 0.1 0 ZOOM 2 ROLL 90 AT 8\n"
@@ -87,6 +88,15 @@ def test_a_film_cuts_from_shot_to_shot(tmp_path: Path) -> None:
     bright = [np.frombuffer(one, np.uint8).reshape(height, width, 3).mean() for one in reader]
     assert len(bright) == 3 + 4
     assert min(bright[:3]) > 5.0 * max(bright[3:])
+
+
+def test_frames_of_a_shot_that_are_not_made_are_told(tmp_path: Path) -> None:
+    """They were missing from the film without a word."""
+    scene = stage(STAGE + "SHOT LONG 0 50\nSHOT SHORT 51 60\nFILM 'cut.html' SHOTS LONG\n", tmp_path)
+    last = float(frame_numbers(scene)[-1])
+    notes = run_scene(scene, tmp_path, dry=True)["notes"]
+    assert f"SHOT LONG has frames 0 to 50, of which only those from 0 to {last:g} are made: see FRAMES" in notes
+    assert not [note for note in notes if "SHORT" in note]  # of no film
 
 
 def test_an_actor_has_its_colour(hands: dict[str, Rig]) -> None:

@@ -37,6 +37,17 @@ def test_edits_are_laid_over_copies_of_actors(run: Callable[[str], Scene]) -> No
         )
 
 
+def test_joints_without_keys_are_edited(run: Callable[[str], Scene]) -> None:
+    """A correction of a digit of which only the base has keys ended in a KeyError."""
+    scene = run("FINGER1 LEFT INDEX FLEXION AT 0 0\nFINGER1 LEFT INDEX FLEXION AT 10 40\n")
+    joint = scene.actor().skeleton.index("left.index.knuckle2")
+    after = SceneAnimation(scene).edited([AngleEdit("LEFT", joint, 6.0, 7.0, 0.2)]).actors["LEFT"]
+    found = [float(after.angles(frame)[joint, FLEXION]) for frame in (0.0, 6.0, 7.0)]
+    assert found == pytest.approx([0.0, 0.0, 0.2], abs=1e-9)
+    same = SceneAnimation(scene).edited([AngleEdit("LEFT", joint, 6.0, None, 0.2)]).actors["LEFT"]
+    assert float(same.angles(9.0)[joint, FLEXION]) == 0.0  # nothing follows that could be replaced
+
+
 def test_what_follows_an_edited_joint_goes_along(run: Callable[[str], Scene]) -> None:
     scene = run(
         "FINGER1 LEFT INDEX FLEXION AT 0 0\nFINGER1 LEFT INDEX FLEXION AT 10 40\n"

@@ -151,6 +151,22 @@ def test_digits_that_bear_too_much_are_opened(run: Callable[[str], Scene], tmp_p
 
 
 @pytest.mark.slow
+def test_a_digit_of_which_one_joint_has_keys_is_opened(run: Callable[[str], Scene], tmp_path: Path) -> None:
+    """It ended in a KeyError: the digit's other joints have no keys."""
+    closing = "FINGER1 LEFT INDEX FLEXION AT 0 0\nFINGER1 LEFT INDEX FLEXION AT 8 6\n"
+    scene = run(
+        PLATE.replace("GRASP 0 4 LEFT plate INDEX\n", "")
+        + closing
+        + "STRENGTH LEFT INDEX 0.5\nPRESS 0 8 EVERY 2 CORRECT"
+    )
+    report = solved(scene, tmp_path)
+    assert report.verdict.corrections
+    assert "opened base by" in report.verdict.corrections[0]
+    assert "left.index.knuckle2.flexion" not in scene.actor("left").motion.tracks
+    assert max(row.share for row in report.rows if row.digit == "index") <= 1.0
+
+
+@pytest.mark.slow
 def test_corrections_are_kept_in_a_state_and_gone_on_from(fine: Rig, tmp_path: Path) -> None:
     def run(text: str) -> Scene:
         scene = Scene(say=lambda text: None, warn=lambda text: None)

@@ -89,6 +89,7 @@ def test_only_the_object_itself_is_loaded() -> None:
         ("PRESTRESS BAR 1 2", "the stress zz in Pa"),
         ("OBJECT BOX2 BOX 0.1 0.1 0.1\nPRESSURE BOX2 TOP AT 0 1", "BOX2 is not physical"),
         ("PHYSICAL BAR OF ADAMANT", "a material"),
+        ("POINTS BAR FOOT UPPER Y 0", "points FOOT of BAR are used above already"),
     ],
 )
 def test_wrong_lines_are_named(line: str, message: str) -> None:

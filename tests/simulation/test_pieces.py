@@ -115,3 +115,18 @@ def test_what_cannot_be_cut(bar: Path) -> None:
     ):
         with pytest.raises(InputError, match=what):
             scene_of(text)
+
+
+def test_pieces_keep_the_friction_of_the_whole() -> None:
+    """It fell back to the default."""
+    floor = "OBJECT floor BOX 1 0.02 1 AT 0 -0.01 0\nOBJECT bar BOX 0.02 0.06 0.02 AT 0 0.03 0\nPHYSICAL bar\n"
+    contact = scene_of(f"{floor}FRICTION bar floor 0.1\nFRICTION bar bar 0.2\nPIECES bar 2\n").contact
+    assert [contact.coefficient(name, "FLOOR") for name in ("BAR_1", "BAR_2")] == [0.1, 0.1]
+    assert contact.coefficient("BAR_1", "BAR_2") == 0.2
+    assert not [pair for pair in contact.friction if "BAR" in pair]
+
+
+def test_pieces_that_do_not_deform_say_what_to_do() -> None:
+    text = "OBJECT bar BOX 0.02 0.06 0.02\nOBJECT b BOX 0.02 0.02 0.02 AT 1 0 0\nPHYSICAL b\nPIECES bar 2\nPRESS 0 1\n"
+    with pytest.raises(InputError, match="BAR_1 does not deform here: PHYSICAL BAR_1 makes it so"):
+        run_contact(scene_of(text), Path())

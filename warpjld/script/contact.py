@@ -189,17 +189,17 @@ class SceneAnimation:
 def write_keys(actor: Actor, edit: AngleEdit) -> None:
     """Set the keys of an edit; the curve before it is preserved by a key at every frame."""
     channel = f"{actor.skeleton.names[edit.joint]}.{CHANNELS[edit.channel]}"
-    track = actor.motion.tracks[channel]
+    track = actor.motion.tracks.get(channel)
     if edit.frame is None:
-        later = [key for key in track.keys if key.frame > edit.kept]
+        later = [] if track is None else [key for key in track.keys if key.frame > edit.kept]
         for key in later:  # a digit that stopped may not have reached the angle that later keys hold
-            if key.value == later[0].value:
+            if track is not None and key.value == later[0].value:
                 track.set(replace(key, value=edit.value))
         return
-    first = track.frames[0]
+    first = edit.kept if track is None else track.frames[0]  # a joint without keys keeps its angle until then
     before = np.unique([*np.arange(np.ceil(first), edit.kept + 1e-9), edit.kept])
-    kept = actor.motion.value(channel, before)
-    for frame, value in zip(before.tolist(), kept.tolist(), strict=True):
+    kept = [actor.value(channel, frame) for frame in before.tolist()]
+    for frame, value in zip(before.tolist(), kept, strict=True):
         actor.set_keys(channel, [frame], value, _THROUGH)
     actor.set_keys(channel, [edit.frame], edit.value, _THROUGH)
 

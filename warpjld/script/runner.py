@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpjld import render
 from warpjld.covering.device import checked_device
 from warpjld.errors import InputError, WarpjldError
@@ -66,6 +69,7 @@ def run_scene(
     outputs = _wanted(scene, summary, page, script)
     checked_device(device)
     _check_outputs(scene, outputs, folder, script, len(frames))
+    summary.notes += _cut_shots(outputs, frames)
     summary.notes += check_contact(scene, outputs, frames)
     for actor in scene.actors.values():
         stage(actor, frames[:1], scene.rate)  # keys beyond limits are found here
@@ -147,6 +151,18 @@ def _check_lengths(scene: Scene, outputs: Sequence[Output], frames: int) -> None
                 open_cache(output.name, actor.rig.surface, frames=frames, rate=scene.rate)
         except InputError as error:
             raise located(InputError(f"'{output.name}': {error.message}"), scene.asked.get(output.name)) from None
+
+
+def _cut_shots(outputs: Sequence[Output], frames: NDArray[np.float64]) -> list[str]:
+    """Notes on shots of which frames are not made."""
+    shots = {shot.name: shot for output in outputs if isinstance(output, FilmOutput) for shot in output.shots}
+    first, last = float(frames[0]), float(frames[-1])
+    return [
+        f"SHOT {name} has frames {shot.first:g} to {shot.last:g}, of which only those from {first:g} to {last:g} are "
+        "made: see FRAMES"
+        for name, shot in shots.items()
+        if shot.first < first or shot.last > last
+    ]
 
 
 def _size(scene: Scene, outputs: Sequence[Output], frames: int) -> float:

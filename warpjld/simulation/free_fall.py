@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from warpjld.errors import InputError
 from warpjld.fem import SolveStatus
 from warpjld.simulation.animation import Animation
 from warpjld.simulation.fall.fall_path import fall_summaries
@@ -20,7 +21,7 @@ from warpjld.simulation.solve.fallen import (
 from warpjld.simulation.solve.falling import Falls, falling_names, follow_falls
 from warpjld.simulation.solve.start_frame import StartFrame, find_start
 from warpjld.simulation.solve_result import SolveResult
-from warpjld.simulation.specification import BondStrength, ContactSpecification, SolveSpecification
+from warpjld.simulation.specification import BondStrength, ContactSpecification, SolveSpecification, located
 
 __all__ = ["after_contact", "before_contact", "let_go"]
 
@@ -38,6 +39,7 @@ def before_contact(
     if not names:
         return specification, animation, find_start(animation, specification, request)
     found = follow_falls(animation, specification, request, names)
+    _refuse_turning(specification, found)
     paths, specification = found.paths, replace(specification, bonds=found.bonds)
     start = fallen_start(paths, float(request.first), float(request.last))
     stage, others = FallenAnimation(animation, paths), without(specification, names)
@@ -76,7 +78,19 @@ def let_go(solved: SolveResult, specification: ContactSpecification, request: So
     if not bodies:
         return None
     standing = standing_objects(model, solved.frames, bodies)
-    return follow_falls(model.animation, held, request, list(bodies), released=bodies, standing=standing, first=first)
+    names, spins = list(bodies), {name: spin for name, spin in held.spins.items() if name not in bodies}
+    falls = follow_falls(
+        model.animation,
+        replace(held, spins=spins),
+        request,
+        names,
+        released=bodies,
+        standing=standing,
+        first=first,
+    )
+    turning = [name for name in names if name in held.spins and held.spins[name].at(first) != 0.0]
+    said = (f"SPIN of {name} does not act while it falls: nothing holds its axis" for name in turning)
+    return replace(falls, openings=(*falls.openings, *said))
 
 
 def after_contact(solved: SolveResult, before: StartFrame) -> tuple[StartFrame, SolveResult]:
@@ -104,6 +118,23 @@ def after_contact(solved: SolveResult, before: StartFrame) -> tuple[StartFrame, 
         solved = replace(solved, released=min(path.frames[0] for path in found[0].paths.values()))
     stopped = None if solved.unsolved is None else solved.unsolved.interrupted
     return replace(before, moved=moved, falls=tuple(said)), _stopped(solved, stopped)
+
+
+def _refuse_turning(specification: ContactSpecification, found: Falls) -> None:
+    """Reject a steady rotation of an object that falls.
+
+    Raises:
+        InputError: With the command's line, if there is one.
+    """
+    for name, path in found.paths.items():
+        spin = specification.spins.get(name)
+        if spin is None or not path.summary() or not any(spin.at(frame) for frame in path.frames):
+            continue
+        text = (
+            f"SPIN {name}: nothing holds {name}, so that it falls or moves, and nothing holds the axis that it should "
+            f"turn about: HOLD points of it, or let it rest where friction is enough"
+        )
+        raise located(InputError(text), spin.where)
 
 
 def _stopped(solved: SolveResult, after: float | None) -> SolveResult:

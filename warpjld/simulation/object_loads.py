@@ -9,6 +9,7 @@ from warpjld.simulation.state_variables import Points
 
 if TYPE_CHECKING:
     from warpjld.motion import Track
+    from warpjld.simulation.object_material import SourceLocation
 
 __all__ = ["ObjectLoad", "ObjectSpin"]
 
@@ -42,11 +43,13 @@ class ObjectSpin:
         axis: Direction of the axis, of any length but zero.
         point: A point on the axis in world coordinates [m].
         track: Keys of the angular speed [rad/s].
+        where: Script location, for messages.
     """
 
     axis: tuple[float, float, float]
     point: tuple[float, float, float]
     track: Track
+    where: SourceLocation | None = None
 
     def at(self, frame: float) -> float:
         """Angular speed at a frame [rad/s]; 0 before its first key."""

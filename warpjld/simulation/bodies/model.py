@@ -202,7 +202,8 @@ def assemble_model(
     for bonded in contact.bonds:
         for name in (bonded.one, bonded.other):
             if name not in {one.name for one in objects}:
-                raise located(InputError(f"a bond to nothing: {name} does not deform here"), bonded.where)
+                text = f"a bond to nothing: {name} does not deform here: PHYSICAL {name} makes it so"
+                raise located(InputError(text), bonded.where)
     ends = np.cumsum([0, *(len(body.mesh.nodes) for body in bodies)])
     spans = {body.name: slice(int(a), int(b)) for body, a, b in zip(bodies, ends[:-1], ends[1:], strict=True)}
     laws: dict[str, Material] = {}

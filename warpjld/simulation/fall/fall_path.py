@@ -29,6 +29,8 @@ class FallPath:
         held: Frame at which hands hold it; None if they never do.
         speed: Speed at the last frame [m/s].
         together: Names of all objects that bonds hold together at its begin.
+        inside: Name of what it begins inside of; empty if nothing.
+        depth: How deep it begins inside of that [m].
     """
 
     name: str
@@ -40,6 +42,8 @@ class FallPath:
     held: float | None = None
     speed: float = 0.0
     together: tuple[str, ...] = ()
+    inside: str = ""
+    depth: float = 0.0
 
     def at(self, frame: float) -> Places:
         """Placement at a frame, interpolated; constant before the first and after the last frame."""
@@ -68,6 +72,8 @@ class FallPath:
             self.rests,
             self.on,
             round(self.speed, 3),
+            self.inside,
+            round(self.depth, 4),
         )
 
     def summary(self, others: Iterable[str] = ()) -> str:
@@ -79,13 +85,18 @@ class FallPath:
             return ""
         names = [self.name, *others]
         one = len(names) == 1
-        be, it, fall, come, leave, move = (
-            ("is", "it", "falls", "comes", "leaves", "moves")
+        be, it, fall, come, leave, move, begin = (
+            ("is", "it", "falls", "comes", "leaves", "moves", "begins")
             if one
-            else ("are", "they", "fall", "come", "leave", "move")
+            else ("are", "they", "fall", "come", "leave", "move", "begin")
         )
         listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
         begun = f"{listed} {be} held by nothing: {it} {fall} from frame {self.frames[0]:g} on"
+        if self.inside:
+            begun = (
+                f"{listed} {begin} {1e3 * self.depth:.2g} mm inside {self.inside} at frame {self.frames[0]:g}, "
+                f"{be} held by nothing, and {be} pushed out"
+            )
         if self.left is not None:
             below = "it" if one else "them"
             return f"{begun}, and {leave} the stage at frame {self.left:g}: nothing is below {below}"

@@ -122,6 +122,7 @@ class RigidBody:
         velocity: Velocity of the centre of mass [m/s], shape (3,).
         spin: Angular velocity [rad/s], shape (3,).
         touching: Names of the bodies and obstacles that press on it.
+        bearers: Those of them that press against gravity; all of them if none does.
     """
 
     def __init__(self, shape: RigidShape, place: Places) -> None:
@@ -131,6 +132,7 @@ class RigidBody:
         self.velocity = np.zeros(3)
         self.spin = np.zeros(3)
         self.touching: tuple[str, ...] = ()
+        self.bearers: tuple[str, ...] = ()
 
     @property
     def parts(self) -> Sequence[RigidBody]:

@@ -61,6 +61,7 @@ def step_bodies(
     time: float,
     step: float,
     length: float,
+    load: Callable[[RigidBody], NDArray[np.float64]] | None = None,
 ) -> list[RigidContact]:
     """Advance bodies by one time step, in place.
 
@@ -72,14 +73,18 @@ def step_bodies(
         time: Time at the begin of the step [frames].
         step: Length of the step [frames].
         length: The same [s].
+        load: External force [N] and moment about the centre of mass [N m] on a body, shape (6,); None: none.
 
     Returns:
         Contacts with a normal impulse.
     """
+    gains = []
     for one in bodies:
-        one.velocity = one.velocity + length * gravity
+        pushed = np.zeros(6) if load is None else load(one)
+        gains.append(gravity + pushed[:3] / one.shape.mass)
+        one.velocity = one.velocity + length * gains[-1]
         inertia = one.turn @ one.shape.inertia @ one.turn.T
-        one.spin = one.spin - length * one.inverse @ np.cross(one.spin, inertia @ one.spin)
+        one.spin = one.spin + length * one.inverse @ (pushed[3:] - np.cross(one.spin, inertia @ one.spin))
         if one.touching:
             one.spin = one.spin / (1.0 + ROLLING * length)
     margins = [_NEAR + 2.0 * length * one.speed for one in bodies]
@@ -93,9 +98,12 @@ def step_bodies(
         mine = [c for c in pressed if k in (c.body, c.other)]
         names = [c.name if c.body == k else c.own for c in mine]
         one.touching = tuple(dict.fromkeys(names))
+        signs = (1.0 if c.body == k else -1.0 for c in mine)
+        upward = [sign * float(c.normal @ gravity) < 0.0 for sign, c in zip(signs, mine, strict=True)]
+        one.bearers = tuple(dict.fromkeys(name for name, up in zip(names, upward, strict=True) if up)) or one.touching
         moved = length * (one.velocity + parting[k, :3])
         if not mine:
-            moved = moved - 0.5 * length**2 * gravity
+            moved = moved - 0.5 * length**2 * gains[k]
         one.centre = one.centre + moved
         one.turn = Rotation.from_rotvec(length * (one.spin + parting[k, 3:])).as_matrix() @ one.turn
     return pressed

@@ -125,15 +125,19 @@ class _Hand:
         if corrected.status is not Correction.CORRECTED or not chosen:
             closed = np.abs(wanted - opened)[:, FLEXION]
             return CorrectedFrame(found, failed=(_not_corrected(self.hand, frame, first, corrected.status, closed),))
-        edits, digits = self._edits(corrected, since, time), self._digits(corrected, first, frame)
+        edits, digits = self._edits(corrected, wanted, since, time), self._digits(corrected, first, frame)
         return CorrectedFrame(chosen[-1], edits, digits)
 
-    def _edits(self, corrected: CorrectedPose, since: float, time: float) -> tuple[AngleEdit, ...]:
+    def _edits(
+        self, corrected: CorrectedPose, wanted: NDArray[np.float64], since: float, time: float
+    ) -> tuple[AngleEdit, ...]:
+        """Edits of the joints that were opened; others of the same digits may have no keys."""
         names = [f"{digit}.{knuckle}" for digit in corrected.opened for knuckle in KNUCKLES]
         start, joints = self.model.start, [self.hand.bones.skeleton.index(name) for name in names]
         return tuple(
             AngleEdit(self.hand.name, joint, start + since, start + time, float(corrected.angles[joint, FLEXION]))
             for joint in joints
+            if corrected.angles[joint, FLEXION] != wanted[joint, FLEXION]
         )
 
     def _digits(self, corrected: CorrectedPose, first: Effort, frame: float) -> tuple[CorrectedDigit, ...]:

@@ -98,10 +98,12 @@ def fallen_start(paths: Mapping[str, FallPath], first: float, last: float) -> fl
 
 
 def without(contact: ContactSpecification, names: Sequence[str]) -> ContactSpecification:
-    """A copy of the specification in which some objects do not deform, and have no bonds."""
+    """A copy of the specification in which some objects do not deform, and have neither bonds nor loads."""
     physical = {name: matter for name, matter in contact.physical.items() if name not in names}
     bonds = [bond for bond in contact.bonds if bond.one not in names and bond.other not in names]
-    return replace(contact, physical=physical, bonds=bonds)
+    loads = {key: load for key, load in contact.loads.items() if key[0] not in names}
+    spins = {name: spin for name, spin in contact.spins.items() if name not in names}
+    return replace(contact, physical=physical, bonds=bonds, loads=loads, spins=spins)
 
 
 def taking_part(paths: Mapping[str, FallPath], start: float) -> list[str]:

@@ -17,6 +17,7 @@ from warpjld.simulation.fall.bonded import bonded_groups
 from warpjld.simulation.fall.fall_path import FallPath
 from warpjld.simulation.fall.rigid_body import RigidBody, rigid_shape
 from warpjld.simulation.fall.rigid_cluster import rigid_union
+from warpjld.simulation.fall.rigid_load import rigid_load
 from warpjld.simulation.solve.falling_stage import FallingStage
 from warpjld.simulation.specification import BondStrength, ContactSpecification, SolveSpecification
 
@@ -46,12 +47,12 @@ class Falls:
 
 
 def falling_names(contact: ContactSpecification, request: SolveSpecification) -> list[str]:
-    """Deformable objects with weight that neither Dirichlet conditions, loads, a grip that lifts them, nor an object
-    bonded to them keep from falling."""
+    """Deformable objects with weight that neither Dirichlet conditions, a grip that lifts them, nor an object bonded
+    to them keep from falling."""
     if request.method == "paper" or not any(contact.pull):
         return []
     stands = {name for name, _ in contact.prescribed} | {grip.object for grip in contact.grips if grip.lift}
-    stands |= contact.loaded | {name for name, matter in contact.physical.items() if not matter.density > 0.0}
+    stands |= {name for name, matter in contact.physical.items() if not matter.density > 0.0}
     stands |= {name for bond in contact.bonds for name in (bond.one, bond.other)} - set(contact.physical)
     groups = bonded_groups([*contact.physical, *(stands - set(contact.physical))], contact.bonds)
     free = {name for group in groups if stands.isdisjoint(group) for name in group}
@@ -82,7 +83,16 @@ def follow_falls(
     """
     start = float(request.first) if first is None else first
     bonds = list(contact.bonds)
-    stage = FallingStage(animation, replace(contact, bonds=bonds), request, start, bool(released), standing or {})
+    loads = {name: rigid_load(contact, name, animation.objects[name].thing) for name in names}
+    stage = FallingStage(
+        animation,
+        replace(contact, bonds=bonds),
+        request,
+        start,
+        bool(released),
+        standing or {},
+        {name: load for name, load in loads.items() if load is not None},
+    )
     for body in _released(released) if released else []:
         stage.add(body)
     for group in [] if released else bonded_groups(names, contact.bonds):

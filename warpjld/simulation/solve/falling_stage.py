@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from warpjld.simulation.fall.contact_points import RigidContact
 from warpjld.simulation.fall.fall_path import FallPath
 from warpjld.simulation.fall.impact import Impact, solve_impact
 from warpjld.simulation.fall.rigid_body import RigidBody, RigidState
+from warpjld.simulation.fall.rigid_load import RigidLoad
 from warpjld.simulation.fall.strike import Strike, found_strikes
 from warpjld.simulation.fall.time_stepping import coast, step_bodies, steps_of
 from warpjld.simulation.solve.friction_closure import friction_closure
@@ -31,6 +32,8 @@ _QUIET = 0.25
 """Time for which it must be slower than that [s]."""
 _CLOSE = 0.01
 """Margin of the bounding boxes within which an actor counts as near a body [m]."""
+_INSIDE = 5e-4
+"""Depth from which a body is said to begin inside another [m]; animators place things less exactly than that."""
 _PRESSED = 2e-4
 """Depth of skin inside an object from which it counts as pressing on it [m]."""
 
@@ -46,6 +49,7 @@ class FallingStage:
         start: First frame.
         released: Whether hands have released the bodies, and no longer hold them.
         standing: Objects that stand elsewhere than in the animation, or deformed, by name.
+        loads: External loads of its objects, by name.
         bodies: Bodies that fall, rest or move.
         paths: Paths of their objects by name.
         openings: Messages about impacts.
@@ -58,6 +62,7 @@ class FallingStage:
     start: float
     released: bool = False
     standing: Mapping[str, Obstacle] = field(default_factory=dict)
+    loads: Mapping[str, RigidLoad] = field(default_factory=dict)
     bodies: list[RigidBody] = field(default_factory=list)
     paths: dict[str, FallPath] = field(default_factory=dict)
     openings: list[str] = field(default_factory=list)
@@ -84,6 +89,8 @@ class FallingStage:
         solids = {
             name: one.obstacle(self.start) for name, one in self.animation.objects.items() if name not in self.paths
         } | dict(self.standing)
+        for body in self.bodies:
+            self._note_overlap(body, solids)
         self._hold(self.start, solids)
         frame, known = self.start, self._known()
         try:
@@ -156,8 +163,19 @@ class FallingStage:
     ) -> list[RigidContact]:
         """Advance bodies by a step [frames]; returns its contacts."""
         gravity, length = np.array(self.contact.pull, np.float64), step / self.request.rate
-        time = now - self.start
-        return step_bodies(bodies, around, gravity, self.contact.coefficient, time=time, step=step, length=length)
+        timing = {"time": now - self.start, "step": step, "length": length}
+        load = partial(self._load, frame=now) if self.loads else None
+        return step_bodies(bodies, around, gravity, self.contact.coefficient, **timing, load=load)
+
+    def _load(self, body: RigidBody, frame: float) -> NDArray[np.float64]:
+        """External force [N] and moment about the centre of mass [N m] on a body, shape (6,)."""
+        out = np.zeros(6)
+        for part in body.parts:
+            if (load := self.loads.get(part.shape.name)) is not None:
+                found = load.at(part, frame)
+                out += found
+                out[3:] += np.cross(part.centre - body.centre, found[:3])
+        return out
 
     def _strike(
         self,
@@ -212,7 +230,7 @@ class FallingStage:
         paths = self._paths(body)
         if body.touching:
             for path in paths:
-                path.on = body.touching
+                path.on = body.bearers
         if body.speed > _STILL:
             self._quiet.pop(body, None)
             for path in paths:
@@ -222,14 +240,28 @@ class FallingStage:
         self._quiet[body] = since, long + length
         if long + length >= _QUIET and self._moves(body):
             for path in paths:
-                path.rests = float(np.ceil(since - 1e-6))
+                path.rests = max(self.start, float(np.ceil(since - 1e-6)))
+
+    def _note_overlap(self, body: RigidBody, solids: Mapping[str, Obstacle]) -> None:
+        """Note what a body begins inside of, and how deep."""
+        points = body.points
+        depths = {name: -float(solid.project(points, 0.0).distance.min()) for name, solid in solids.items()}
+        depths |= {o.shape.name: -float(o.project(points).distance.min()) for o in self.bodies if o is not body}
+        name = max(depths, key=lambda known: depths[known], default="")
+        if name and depths[name] > _INSIDE:
+            for path in self._paths(body):
+                path.inside, path.depth = name, depths[name]
 
     def _skins(self, before: float, after: float) -> dict[str, Obstacle]:
         """Surfaces of actors near any body between two frames, as keyframed obstacles by name."""
         out: dict[str, Obstacle] = {}
         for name, actor in self.animation.actors.items():
             shapes = np.stack([actor.skin(before), actor.skin(after)])
-            if not any(_meet(shapes, body, (after - before) / self.request.rate) for body in self.bodies):
+            length, pull = (after - before) / self.request.rate, float(np.linalg.norm(self.contact.pull))
+            gains = [
+                pull + float(np.linalg.norm(self._load(body, after)[:3])) / body.shape.mass for body in self.bodies
+            ]
+            if not any(_meet(shapes, body, length, gain) for body, gain in zip(self.bodies, gains, strict=True)):
                 continue
             times = [before - self.start, after - self.start]
             out[name] = Keyframed(actor.covering.surface.faces, times, shapes)
@@ -271,8 +303,9 @@ def _fixed(body: RigidBody) -> Obstacle:
     return Keyframed(facets.faces, [0.0], body.stage(facets.vertices)[None])
 
 
-def _meet(shapes: NDArray[np.float64], body: RigidBody, length: float) -> bool:
-    """Whether the box of a surface at two times (2, V, 3) comes near a body that falls for ``length`` seconds."""
-    reach = body.shape.reach + length * (body.speed + 9.81 * length) + _CLOSE  # free fall at 9.81 m/s²
+def _meet(shapes: NDArray[np.float64], body: RigidBody, length: float, gain: float) -> bool:
+    """Whether the box of a surface at two times (2, V, 3) comes near a body that moves for ``length`` seconds with an
+    acceleration of at most ``gain`` [m/s²]."""
+    reach = body.shape.reach + length * (body.speed + gain * length) + _CLOSE
     low, high = shapes.min(axis=(0, 1)) - reach, shapes.max(axis=(0, 1)) + reach
     return bool((body.centre > low).all() and (body.centre < high).all())

@@ -70,7 +70,7 @@ def place_body(vertices: Array, faces: NDArray[np.integer], label: str = "the bo
     # path lengths are in the solid's unit, too
     solid.graph.data /= stance.height
     points: Points = {}
-    legs = _legs(solid, points)
+    legs = _legs(solid, points, label)
     _trunk(solid, points)
     surface = stance.inward(vertices)
     _head(solid, surface, points)
@@ -112,7 +112,7 @@ def _crotch(solid: VoxelSolid) -> float:
     return _USUAL_CROTCH
 
 
-def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
+def _legs(solid: VoxelSolid, points: Points, label: str) -> NDArray[np.bool_]:
     """Place the joints from hips to toes; returns the mask of the legs' voxels."""
     crotch = _crotch(solid)
     high = crotch + _HIP
@@ -122,13 +122,17 @@ def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
     for side, sign in (("left", 1.0), ("right", -1.0)):
         thigh = solid.points[_leg_section(solid, crotch - 3.0 * solid.size, sign)].mean(axis=0)
         hip = np.array([thigh[0], high, (thigh[2] + middle[2]) / 2])
-        shin = [solid.points[_leg_section(solid, y, sign)].mean(axis=0) for y in (0.075, 0.14)]
+        sole = _sole(solid, legs, sign)
+        sections = [_leg_section(solid, sole + y, sign) for y in (0.075, 0.14)]
+        if not all(len(one) for one in sections):
+            raise InputError(f"{label}: no {side} leg stands apart from the other down to its ankle")
+        shin = [solid.points[one].mean(axis=0) for one in sections]
         ankle = shin[0] + (shin[0] - shin[1]) * (0.075 - _ANKLE) / 0.065
         knee_height = ankle[1] + _KNEE * (hip[1] - ankle[1])
         points[f"{side}.femoral_head"] = hip
         points[f"{side}.knee"] = solid.points[_leg_section(solid, knee_height, sign)].mean(axis=0)
         points[f"{side}.ankle"] = ankle
-        _foot(solid, side, sign, points)
+        _foot(solid, side, sign, sole, points)
     hips = (points["left.femoral_head"] + points["right.femoral_head"]) / 2
     points["pelvis"] = np.array([0.0, hips[1] + 0.01, middle[2]])
     for side in ("left", "right"):
@@ -136,9 +140,15 @@ def _legs(solid: VoxelSolid, points: Points) -> NDArray[np.bool_]:
     return legs
 
 
-def _foot(solid: VoxelSolid, side: str, sign: float, points: Points) -> None:
+def _sole(solid: VoxelSolid, legs: NDArray[np.bool_], sign: float) -> float:
+    """Height of a foot above the other: 0 for the lower one, or for both of who stands on both."""
+    own = legs & (sign * solid.points[:, 0] > 0)
+    return float(solid.points[own, 1].min() - solid.points[legs, 1].min()) if own.any() else 0.0
+
+
+def _foot(solid: VoxelSolid, side: str, sign: float, sole: float, points: Points) -> None:
     ankle = points[f"{side}.ankle"]
-    foot = solid.points[(solid.points[:, 1] < _ANKLE + 0.01) & (sign * solid.points[:, 0] > 0)]
+    foot = solid.points[(solid.points[:, 1] < sole + _ANKLE + 0.01) & (sign * solid.points[:, 0] > 0)]
     foot = foot[np.linalg.norm((foot - ankle)[:, [0, 2]], axis=1) < 0.2]
     ahead = foot[foot[:, 2] > np.quantile(foot[:, 2], 0.9)].mean(axis=0) - ankle
     forward = unit(np.array([ahead[0], 0.0, ahead[2]]))
@@ -203,7 +213,8 @@ def _lean_depth(solid: VoxelSolid) -> float:
 
 def _head(solid: VoxelSolid, surface: Array, points: Points) -> None:
     base = points["skull_base"]
-    skull = (solid.points[:, 1] > base[1]) & (np.abs(solid.points[:, 0]) < 0.09)
+    skull = (solid.points[:, 1] > base[1]) & (solid.points[:, 1] < 1.0 + solid.size)
+    skull &= np.abs(solid.points[:, 0]) < 0.09
     crown = float(solid.points[skull, 1].max())
     radius = min(float(solid.depth[skull].max()), 0.6 * (crown - base[1]))
     top = solid.points[skull & (np.abs(solid.points[:, 1] - (crown - radius)) < 1.2 * solid.size)].mean(axis=0)
