@@ -22,9 +22,10 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.digit_squeeze import DigitSqueeze
 from warpjld.simulation.grip.force import ForceStatus
 from warpjld.simulation.grip.found import FoundGrip, digits_that_press
-from warpjld.simulation.grip.opposed import allowed_left, worst_opposed
+from warpjld.simulation.grip.opposed import allowed_left, firmest_allowed, left_ratio, worst_opposed
+from warpjld.simulation.grip.pressed_digits import PressedDigits
 from warpjld.simulation.grip.search_budget import SearchBudget
-from warpjld.simulation.grip.shared_force import PressedDigits, share_force
+from warpjld.simulation.grip.shared_force import share_force
 from warpjld.simulation.grip.squeeze import Squeeze
 from warpjld.simulation.report.balance import ObjectBalance
 from warpjld.simulation.specification import GripSpecification
@@ -50,6 +51,8 @@ _ROUNDS = 2
 """Most distributions: directions of forces change as digits close, and are not known before a digit presses."""
 _REACHED = 1.03
 """Force over the one asked for that counts as the same, as searches find it within 2 %."""
+_SHORT = 0.97
+"""Force over the one asked for below which a part of closings that are not balanced is looked for."""
 _SPARE = 2.0
 """Force at which the share of a digit is 1, over the force it should have: shares stay below 1, as those of muscles."""
 
@@ -133,7 +136,7 @@ def balanced_grip(
     each = DigitSqueeze(model, squeeze.history, hand, taking, squeeze.first, squeeze.limits, SearchBudget())
     low, high = each.range(request.most)
     high[each.touch > high] = 0.0  # a digit that touches nothing stays as it is
-    grips = np.full(len(taking), grip)
+    grips, last = np.full(len(taking), grip), None
     for alike in squeeze.known:
         each.note(np.full(len(taking), alike), squeeze.angles(alike), squeeze.closed(alike))
     for _ in range(_ROUNDS if len(taking) > 1 else 0):
@@ -142,18 +145,39 @@ def balanced_grip(
             break
         each.wanted = _SPARE * wanted
         press, strengths, touch = _telling(each, wanted, tell), each.wanted, each.touch
-        found = share_force(press, low, high, strengths, force, start=start, even=_EVEN, begin=grips, touch=touch)
-        known = each.known(found.grips)
-        if known is None or found.status not in (ForceStatus.REACHED, ForceStatus.UNEVEN):
+        spent = each.spent
+        found = share_force(
+            press, low, high, strengths, force, start=start, even=_EVEN, begin=grips, touch=touch, exhausted=spent
+        )
+        there = each.known(found.grips)
+        if there is None or found.status not in (ForceStatus.REACHED, ForceStatus.UNEVEN):
             break
-        effort, instant, grips = each.effort(found.grips, known), known, found.grips
+        effort, instant, grips = each.effort(found.grips, there), there, found.grips
+        last = grips
         after = worst_opposed(model, instant, before.object)
         if after is None or max(one.share for one in effort.digits) > 1.0 or not after.net < _LOWER * balance.net:
             break
         if after.net <= allowed_left(after):
             break
         balance = after
-    return _firmest(each, before, force)
+    best = _firmest(each, before, force)
+    if last is not None and (best is None or best.forces.sum() < _SHORT * force):
+        _ease(each, last, before.object, tell)
+        best = _firmest(each, before, force)
+    return best
+
+
+def _ease(each: DigitSqueeze, grips: Array, name: str, tell: Callable[[str], None]) -> None:
+    """Look for the firmest part of closings (D,) [rad] at which a rigid object is balanced, as they come nearer to that
+    than equal ones."""
+
+    def ratio(part: float) -> float:
+        return left_ratio(each.model, each.solved_at(part * grips), name)
+
+    def say(part: float, found: float) -> None:
+        tell(f"{100.0 * part:.0f} % of these closings: {found:.2f} of what may be left over on {name}")
+
+    firmest_allowed(ratio, [0.0, 1.0], 1.0, say)
 
 
 def _firmest(each: DigitSqueeze, before: ObjectBalance, force: float) -> BalancedGrip | None:

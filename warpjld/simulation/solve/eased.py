@@ -1,0 +1,112 @@
+"""Load steps in which a free object gives way: through a medium that resists its motion, and fades (R112).
+
+An object that nothing but contact holds moves, when a hand presses it, to where the forces on it balance. That may be
+millimetres away, past places where it slips, rolls or loses a contact, and Newton's method finds no equilibrium there.
+Here the object moves through a viscous medium, in backward Euler steps of the overdamped motion (pseudo-transient
+continuation: Kelley and Keyes 1998, SIAM J. Numer. Anal. 35, 508–523), first while the hand moves, then while it stays.
+The medium becomes thinner where steps converge quickly, and thicker where they do not. Once hardly anything moves, the
+last step is solved without it: what is returned is an equilibrium, or was not found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpjld.fem import Loads, SolveStatus
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.bodies.model import ContactModel
+
+__all__ = ["EASED_SOLVES", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
+
+Array = NDArray[np.float64]
+Step = Callable[[ContactSolution, float, Callable[[float], Loads] | None], ContactSolution]
+"""One load step: solution to start from, time, and loads instead of those without a medium."""
+
+EASED_SOLVES, UNEASED_SOLVES = 20, 60
+"""Most linear solves of a step through the medium, and of one without it before the object is let give way."""
+
+_DRAG = 1e3
+"""First drag of an object [N/m]: about the stiffness of a finger's pad that presses with 1 N."""
+_STIFFER, _SOFTER = 4.0, 0.4
+"""Factors on the drag after a step that fails, and after one of few solves; as for objects that ride along."""
+_FEW = 10
+"""Linear solves of a step from which on the drag is not reduced."""
+_MOMENT = 1e-3
+"""Part of the load step that passes in a step in which the hand stays."""
+_MOVES, _STEPS, _FAILURES = 4, 30, 4
+"""Steps while the hand moves, most while it stays, and most that fail one after another."""
+_RESTS, _FINER = 1e-2, 0.1
+"""Force of the medium over what presses at which an object rests, and factor on it where no equilibrium is found."""
+
+
+def around_free_objects(model: ContactModel, since: float, time: float) -> Array | None:
+    """Share of an object's drag on each of its nodes, for objects that only contact holds, shape (N,), 0 elsewhere;
+    None if there is none."""
+    out = np.zeros(len(model.body.mesh.nodes))
+    for one in model.objects:
+        held = len(one.prescribed(time, History()).degrees) or one.rides(since) or one.rides(time)
+        if not held:
+            span = model.spans[one.name]
+            out[span] = 1.0 / (span.stop - span.start)
+    return out if out.any() else None
+
+
+def solve_eased(
+    step: Step, loads: Callable[[float], Loads], before: ContactSolution, time: float, around: Array
+) -> ContactSolution:
+    """Equilibrium at a time, reached through a medium; its status tells whether it was found.
+
+    Args:
+        step: Solves a load step.
+        loads: Loads without the medium at a time.
+        before: Solution to start from.
+        time: Time of the equilibrium.
+        around: Share of the drag on each node, shape (N,).
+    """
+    since, whole = before.last.time, time - before.last.time
+    moment = _MOMENT * whole
+    stays = time - (_STEPS + 1) * moment
+    here, found, drag, failures, rests, spent = before, before, _DRAG, 0, _RESTS, 0
+    instants: list[ContactInstant] = []
+    part = (stays - since) / _MOVES
+    for _ in range(_MOVES + _STEPS + _FAILURES):
+        now = here.last.time
+        ahead = min(now + part, stays) if stays - now > moment else now + moment
+        if ahead >= time - 0.5 * moment:
+            break
+        found = step(here, ahead, _dragged(loads, (ahead - now) * drag * around))
+        spent += found.spent
+        if not found.converged:
+            failures, drag = failures + 1, _STIFFER * drag
+            if ahead <= stays:
+                part *= 0.5
+            if failures > _FAILURES:
+                break
+            continue
+        way = np.linalg.norm(found.last.displacement - here.last.displacement, axis=1)
+        # the correction of a step in which hardly anything moves says nothing of those to come
+        here, failures = replace(found, correction_rate=None), 0
+        instants += found.instants
+        pushed = sum(float(np.linalg.norm(touch.nodal, axis=1).sum()) for touch in found.last.touches)
+        left = drag * float(around @ way)
+        if ahead > stays - 0.5 * moment and left <= rests * pushed:
+            found = step(here, time, None)
+            spent += found.spent
+            if found.converged:
+                return replace(found, instants=(*instants, *found.instants), spent=spent)
+            if rests < _RESTS:
+                break
+            rests *= _FINER
+        if here.spent <= _FEW:
+            drag *= _SOFTER
+    status = SolveStatus.MAX_ITERATIONS if found.converged else found.status
+    return replace(found, status=status, instants=(*instants, here.last), spent=spent)
+
+
+def _dragged(loads: Callable[[float], Loads], drag: Array) -> Callable[[float], Loads]:
+    return lambda time: replace(loads(time), drag=drag)
