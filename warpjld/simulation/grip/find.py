@@ -33,7 +33,7 @@ _NEAR = 0.1
 """Tolerance of the smallest grip, relative to its force: a trial near the limit, where the object creeps, takes 50 to
 100 linear solves."""
 
-_CLOSING, _STEP = 450, 80
+_CLOSING, _STEP = 450, 120
 """Most linear solves while all digits close alike until a force is reached, and of one load step of that: 80 to 130 and
 5 to 10 as a rule, up to 30 where a step is halved."""
 _REACHED = 0.03

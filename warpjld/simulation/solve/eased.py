@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Step = Callable[[ContactSolution, float, Callable[[float], Loads] | None], ContactSolution]
 """One load step: solution to start from, time, and loads instead of those without a medium."""
 
-EASED_SOLVES, UNEASED_SOLVES = 20, 60
+EASED_SOLVES, UNEASED_SOLVES = 20, 16
 """Most linear solves of a step through the medium, and of one without it before the object is let give way."""
 
 _DRAG = 1e3
@@ -36,10 +36,10 @@ _STIFFER, _SOFTER = 4.0, 0.4
 """Factors on the drag after a step that fails, and after one of few solves; as for objects that ride along."""
 _FEW = 10
 """Linear solves of a step from which on the drag is not reduced."""
-_MOMENT = 1e-3
+_MOMENT = 5e-4
 """Part of the load step that passes in a step in which the hand stays."""
-_MOVES, _STEPS, _FAILURES = 4, 30, 4
-"""Steps while the hand moves, most while it stays, and most that fail one after another."""
+_MOVES, _STEPS, _FAILURES, _MOST = 4, 60, 4, 200
+"""Steps while the hand moves, most while it stays, most that fail one after another, and most linear solves."""
 _RESTS, _FINER = 1e-2, 0.1
 """Force of the medium over what presses at which an object rests, and factor on it where no equilibrium is found."""
 
@@ -74,7 +74,7 @@ def solve_eased(
     here, found, drag, failures, rests, spent = before, before, _DRAG, 0, _RESTS, 0
     instants: list[ContactInstant] = []
     part = (stays - since) / _MOVES
-    for _ in range(_MOVES + _STEPS + _FAILURES):
+    while spent < _MOST:
         now = here.last.time
         ahead = min(now + part, stays) if stays - now > moment else now + moment
         if ahead >= time - 0.5 * moment:
@@ -89,8 +89,9 @@ def solve_eased(
                 break
             continue
         way = np.linalg.norm(found.last.displacement - here.last.displacement, axis=1)
+        softer, failures = found.spent <= _FEW and failures == 0, 0
         # the correction of a step in which hardly anything moves says nothing of those to come
-        here, failures = replace(found, correction_rate=None), 0
+        here = replace(found, correction_rate=None)
         instants += found.instants
         pushed = sum(float(np.linalg.norm(touch.nodal, axis=1).sum()) for touch in found.last.touches)
         left = drag * float(around @ way)
@@ -102,7 +103,7 @@ def solve_eased(
             if rests < _RESTS:
                 break
             rests *= _FINER
-        if here.spent <= _FEW:
+        if softer:
             drag *= _SOFTER
     status = SolveStatus.MAX_ITERATIONS if found.converged else found.status
     return replace(found, status=status, instants=(*instants, here.last), spent=spent)

@@ -1,0 +1,98 @@
+"""A free object that gives way through a medium: a spring pulls a node to where no single step gets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpjld.fem import Loads, SolveStatus
+from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.simulation.solve.eased import around_free_objects, solve_eased
+
+SPRING = 500.0
+"""Stiffness that draws the node [N/m]."""
+AROUND = np.array([1.0])
+
+
+def solution(time: float, at: float, status: SolveStatus = SolveStatus.CONVERGED, solves: int = 3) -> ContactSolution:
+    force = SPRING * np.array([[at, 0.0, 0.0]])
+    touch: Any = SimpleNamespace(nodal=np.where(np.abs(force) > 0.0, 1.0, 0.0))  # what presses, about 1 N
+    displacement = np.array([[at, 0.0, 0.0]])
+    instant = ContactInstant(time, displacement, np.zeros((1, 3)), (touch,), solves, 0, 0.0)
+    return ContactSolution(status, (instant,), "", (), (solves,), Loads(), spent=solves)
+
+
+def spring(goal: float, longest: float, solved: list[float]) -> Callable[..., ContactSolution]:
+    """Steps of a node drawn to ``goal``, which fail where it would go farther in one than ``longest``."""
+
+    def step(before: ContactSolution, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
+        at, since = float(before.last.displacement[0, 0]), before.last.time
+        around = None if loads is None else loads(time).drag
+        resists = 0.0 if around is None else float(around[0]) / (time - since)
+        to = (SPRING * goal + resists * at) / (SPRING + resists)
+        if abs(to - at) > longest:
+            return solution(since, at, SolveStatus.INDEFINITE, 20)
+        solved.append(time)
+        return solution(time, to)
+
+    return step
+
+
+@pytest.mark.parametrize("longest", [4e-3, 2e-3, 8e-4])
+def test_what_a_step_does_not_find_is_reached_through_a_medium(longest: float) -> None:
+    goal, start, times = 5e-3, solution(2.0, 0.0), list[float]()
+    step = spring(goal, longest, times)
+    assert not step(start, 3.0, None).converged
+    found = solve_eased(step, lambda time: Loads(), start, 3.0, AROUND)
+    assert found.converged
+    assert found.last.time == 3.0
+    assert found.last.displacement[0, 0] == pytest.approx(goal, rel=1e-9)  # the last step has no medium
+    assert times == sorted(times)
+    assert found.spent >= 3 * len(times)
+
+
+def test_what_finds_no_rest_fails_after_few_steps() -> None:
+    """Every step without a medium fails, as where there is no equilibrium."""
+    usual = spring(5e-3, 4e-3, [])
+
+    def step(before: ContactSolution, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
+        failed = solution(before.last.time, float(before.last.displacement[0, 0]), SolveStatus.SLIDING, 20)
+        return failed if loads is None else usual(before, time, loads)
+
+    found = solve_eased(step, lambda time: Loads(), solution(2.0, 0.0), 3.0, AROUND)
+    assert found.status is SolveStatus.SLIDING
+    assert found.spent < 200
+
+
+def test_steps_that_all_fail_end_it() -> None:
+    tried = []
+
+    def step(before: ContactSolution, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
+        tried.append(time)
+        return solution(before.last.time, 0.0, SolveStatus.INDEFINITE, 20)
+
+    assert not solve_eased(step, lambda time: Loads(), solution(0.0, 0.0), 1.0, AROUND).converged
+    assert len(tried) <= 6
+
+
+def test_only_what_nothing_holds_gives_way() -> None:
+    def body(name: str, held: int, rides: bool = False) -> Any:
+        return SimpleNamespace(
+            name=name, prescribed=lambda *_: SimpleNamespace(degrees=np.arange(held)), rides=lambda time: rides
+        )
+
+    spans = {"FREE": slice(1, 3), "HELD": slice(3, 5), "LIFTED": slice(5, 6)}
+    model: Any = SimpleNamespace(
+        body=SimpleNamespace(mesh=SimpleNamespace(nodes=np.zeros((6, 3)))),
+        objects=[body("FREE", 0), body("HELD", 3), body("LIFTED", 0, rides=True)],
+        spans=spans,
+    )
+    around = around_free_objects(model, 0.0, 1.0)
+    assert around is not None
+    np.testing.assert_allclose(around, [0.0, 0.5, 0.5, 0.0, 0.0, 0.0])
+    model.objects = model.objects[1:]
+    assert around_free_objects(model, 0.0, 1.0) is None
