@@ -29,8 +29,8 @@ def solution(time: float, at: float, status: SolveStatus = SolveStatus.CONVERGED
 def spring(goal: float, longest: float, solved: list[float]) -> Callable[..., ContactSolution]:
     """Steps of a node drawn to ``goal``, which fail where it would go farther in one than ``longest``."""
 
-    def step(before: ContactSolution, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
-        at, since = float(before.last.displacement[0, 0]), before.last.time
+    def step(before: ContactSolution | None, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
+        at, since = (0.0, 0.0) if before is None else (float(before.last.displacement[0, 0]), before.last.time)
         around = None if loads is None else loads(time).drag
         resists = 0.0 if around is None else float(around[0]) / (time - since)
         to = (SPRING * goal + resists * at) / (SPRING + resists)
@@ -55,12 +55,18 @@ def test_what_a_step_does_not_find_is_reached_through_a_medium(longest: float) -
     assert found.spent >= 3 * len(times)
 
 
+def test_it_begins_from_rest_too() -> None:
+    found = solve_eased(spring(5e-3, 4e-3, []), lambda time: Loads(), None, 3.0, AROUND)
+    assert found.converged
+    assert found.last.displacement[0, 0] == pytest.approx(5e-3, rel=1e-9)
+
+
 def test_what_finds_no_rest_fails_after_few_steps() -> None:
     """Every step without a medium fails, as where there is no equilibrium."""
     usual = spring(5e-3, 4e-3, [])
 
-    def step(before: ContactSolution, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
-        failed = solution(before.last.time, float(before.last.displacement[0, 0]), SolveStatus.SLIDING, 20)
+    def step(before: ContactSolution | None, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
+        failed = solution(2.0, 0.0, SolveStatus.SLIDING, 20)
         return failed if loads is None else usual(before, time, loads)
 
     found = solve_eased(step, lambda time: Loads(), solution(2.0, 0.0), 3.0, AROUND)
@@ -71,9 +77,9 @@ def test_what_finds_no_rest_fails_after_few_steps() -> None:
 def test_steps_that_all_fail_end_it() -> None:
     tried = []
 
-    def step(before: ContactSolution, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
+    def step(before: ContactSolution | None, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
         tried.append(time)
-        return solution(before.last.time, 0.0, SolveStatus.INDEFINITE, 20)
+        return solution(0.0, 0.0, SolveStatus.INDEFINITE, 20)
 
     assert not solve_eased(step, lambda time: Loads(), solution(0.0, 0.0), 1.0, AROUND).converged
     assert len(tried) <= 6

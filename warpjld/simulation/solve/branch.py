@@ -85,12 +85,12 @@ def solve_onward(
             check=False,
         )
 
-    around = around_free_objects(model, after.last.time, times[-1]) if ease and after is not None else None
+    since = 0.0 if after is None else after.last.time
+    around = around_free_objects(model, since, times[-1]) if ease else None
     if around is None:
         return pressed(after, times, asked, halvings, solves)
-    assert after is not None
 
-    def step(before: ContactSolution, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
+    def step(before: ContactSolution | None, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
         return pressed(before, [time], loads or asked, 0, EASED_SOLVES)
 
     here, instants, spent = after, list[ContactInstant](), 0
@@ -106,6 +106,7 @@ def solve_onward(
         if not found.converged:
             return replace(found, instants=(*instants,), spent=spent)
         here = found
+    assert here is not None
     return replace(here, instants=(*instants,), spent=spent)
 
 
@@ -168,5 +169,14 @@ def solve_branch(
         objects[name] = replace(objects[name], other=lambda time: prescribed(share(time)))
     aside = replace(model, hands=tuple(hands.values()), objects=tuple(objects.values()))
     times = [begin + length * (k + 1) / steps for k in range(steps)]
-    limits = {"halvings": halvings, "solves": solves}
-    return solve_onward(aside, history, after, times, loads=loads, tolerance=tolerance, ease=ease, **limits)
+    return solve_onward(
+        aside,
+        history,
+        after,
+        times,
+        loads=loads,
+        halvings=halvings,
+        solves=solves,
+        tolerance=tolerance,
+        ease=ease,
+    )

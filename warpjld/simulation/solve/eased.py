@@ -24,7 +24,7 @@ from warpjld.simulation.bodies.model import ContactModel
 __all__ = ["EASED_SOLVES", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
 
 Array = NDArray[np.float64]
-Step = Callable[[ContactSolution, float, Callable[[float], Loads] | None], ContactSolution]
+Step = Callable[[ContactSolution | None, float, Callable[[float], Loads] | None], ContactSolution]
 """One load step: solution to start from, time, and loads instead of those without a medium."""
 
 EASED_SOLVES, UNEASED_SOLVES = 20, 16
@@ -57,25 +57,25 @@ def around_free_objects(model: ContactModel, since: float, time: float) -> Array
 
 
 def solve_eased(
-    step: Step, loads: Callable[[float], Loads], before: ContactSolution, time: float, around: Array
+    step: Step, loads: Callable[[float], Loads], before: ContactSolution | None, time: float, around: Array
 ) -> ContactSolution:
     """Equilibrium at a time, reached through a medium; its status tells whether it was found.
 
     Args:
         step: Solves a load step.
         loads: Loads without the medium at a time.
-        before: Solution to start from.
+        before: Solution to start from; None: from rest.
         time: Time of the equilibrium.
         around: Share of the drag on each node, shape (N,).
     """
-    since, whole = before.last.time, time - before.last.time
-    moment = _MOMENT * whole
+    since = 0.0 if before is None else before.last.time
+    moment = _MOMENT * (time - since)
     stays = time - (_STEPS + 1) * moment
     here, found, drag, failures, rests, spent = before, before, _DRAG, 0, _RESTS, 0
     instants: list[ContactInstant] = []
     part = (stays - since) / _MOVES
     while spent < _MOST:
-        now = here.last.time
+        now = since if here is None else here.last.time
         ahead = min(now + part, stays) if stays - now > moment else now + moment
         if ahead >= time - 0.5 * moment:
             break
@@ -88,7 +88,8 @@ def solve_eased(
             if failures > _FAILURES:
                 break
             continue
-        way = np.linalg.norm(found.last.displacement - here.last.displacement, axis=1)
+        was = 0.0 if here is None else here.last.displacement
+        way = np.linalg.norm(found.last.displacement - was, axis=1)
         softer, failures = found.spent <= _FEW and failures == 0, 0
         # the correction of a step in which hardly anything moves says nothing of those to come
         here = replace(found, correction_rate=None)
@@ -105,8 +106,9 @@ def solve_eased(
             rests *= _FINER
         if softer:
             drag *= _SOFTER
+    assert found is not None
     status = SolveStatus.MAX_ITERATIONS if found.converged else found.status
-    return replace(found, status=status, instants=(*instants, here.last), spent=spent)
+    return replace(found, status=status, spent=spent)
 
 
 def _dragged(loads: Callable[[float], Loads], drag: Array) -> Callable[[float], Loads]:
