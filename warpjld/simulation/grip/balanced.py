@@ -53,6 +53,8 @@ _REACHED = 1.03
 """Force over the one asked for that counts as the same, as searches find it within 2 %."""
 _SHORT = 0.97
 """Force over the one asked for below which a part of closings that are not balanced is looked for."""
+_ASKED = 0.02
+"""Relative difference from the force asked for within which a grip presses with it."""
 _SPARE = 2.0
 """Force at which the share of a digit is 1, over the force it should have: shares stay below 1, as those of muscles."""
 
@@ -181,9 +183,10 @@ def _ease(each: DigitSqueeze, grips: Array, name: str, tell: Callable[[str], Non
 
 
 def _firmest(each: DigitSqueeze, before: ObjectBalance, force: float) -> BalancedGrip | None:
-    """The grip found that presses with most, but not with more than ``force`` [N] or than muscles can, and balances the
-    object; None if there is none."""
-    best = None
+    """The grip found that balances the object and presses with ``force`` [N], and of those the best balanced one; or
+    else the one that presses with most, but not with more than that, or than muscles can; None if there is none."""
+    best: BalancedGrip | None = None
+    most = (False, 0.0)
     for grips, instant in each.found:
         after = worst_opposed(each.model, instant, before.object)
         if after is None or after.net > allowed_left(after):
@@ -191,7 +194,10 @@ def _firmest(each: DigitSqueeze, before: ObjectBalance, force: float) -> Balance
         effort = each.effort(grips, instant)
         forces = np.array([effort[digit].force for digit in each.digits])
         over = forces.sum() > _REACHED * force or max(one.share for one in effort.digits) > 1.0
-        if not over and (best is None or forces.sum() > best.forces.sum()):
+        as_asked = bool(abs(forces.sum() / force - 1.0) <= _ASKED)
+        good = (as_asked, -after.net if as_asked else float(forces.sum()))
+        if not over and (best is None or good > most):
+            most = good
             best = BalancedGrip(each.digits, each.joints, grips, forces, each.angles(grips), effort, before, after)
     return best
 

@@ -17,7 +17,7 @@ from warpjld.fem.contact import ContactInstant, ContactSolution, press
 from warpjld.fem.hand.blend import Moves
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.solve.eased import EASED_SOLVES, UNEASED_SOLVES, around_free_objects, solve_eased
+from warpjld.simulation.solve.eased import EASED_SOLVES, ROUGH, UNEASED_SOLVES, around_free_objects, solve_eased
 
 __all__ = ["solve_branch", "solve_onward"]
 
@@ -68,6 +68,7 @@ def solve_onward(
         loads: Callable[[float], Loads],
         halvings: int | None,
         solves: int | None,
+        tolerance: float = tolerance,
     ) -> ContactSolution:
         return press(
             model.body,
@@ -91,7 +92,7 @@ def solve_onward(
         return pressed(after, times, asked, halvings, solves)
 
     def step(before: ContactSolution | None, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
-        return pressed(before, [time], loads or asked, 0, EASED_SOLVES)
+        return pressed(before, [time], loads or asked, 0, EASED_SOLVES, ROUGH if loads else tolerance)
 
     here, instants, spent = after, list[ContactInstant](), 0
     for time in times:

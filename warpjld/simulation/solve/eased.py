@@ -21,7 +21,7 @@ from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 
-__all__ = ["EASED_SOLVES", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
+__all__ = ["EASED_SOLVES", "ROUGH", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
 
 Array = NDArray[np.float64]
 Step = Callable[[ContactSolution | None, float, Callable[[float], Loads] | None], ContactSolution]
@@ -29,6 +29,9 @@ Step = Callable[[ContactSolution | None, float, Callable[[float], Loads] | None]
 
 EASED_SOLVES, UNEASED_SOLVES = 20, 16
 """Most linear solves of a step through the medium, and of one without it before the object is let give way."""
+
+ROUGH = 1e-2
+"""Residual of a step through the medium, over the forces in balance: it is only passed through."""
 
 _DRAG = 1e3
 """First drag of an object [N/m]: about the stiffness of a finger's pad that presses with 1 N."""
@@ -40,7 +43,7 @@ _MOMENT = 5e-4
 """Part of the load step that passes in a step in which the hand stays."""
 _MOVES, _STEPS, _FAILURES, _MOST = 4, 60, 4, 200
 """Steps while the hand moves, most while it stays, most that fail one after another, and most linear solves."""
-_RESTS, _FINER = 1e-2, 0.1
+_RESTS, _FINER = 2e-2, 0.1
 """Force of the medium over what presses at which an object rests, and factor on it where no equilibrium is found."""
 
 
