@@ -91,8 +91,10 @@ def solve_onward(
     if around is None:
         return pressed(after, times, asked, halvings, solves)
 
-    def step(before: ContactSolution | None, time: float, loads: Callable[[float], Loads] | None) -> ContactSolution:
-        return pressed(before, [time], loads or asked, 0, EASED_SOLVES, ROUGH if loads else tolerance)
+    def step(
+        before: ContactSolution | None, time: float, loads: Callable[[float], Loads], exact: bool
+    ) -> ContactSolution:
+        return pressed(before, [time], loads, 0, EASED_SOLVES, tolerance if exact else ROUGH)
 
     here, instants, spent = after, list[ContactInstant](), 0
     for time in times:

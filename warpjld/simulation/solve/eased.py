@@ -5,7 +5,8 @@ millimetres away, past places where it slips, rolls or loses a contact, and Newt
 Here the object moves through a viscous medium, in backward Euler steps of the overdamped motion (pseudo-transient
 continuation: Kelley and Keyes 1998, SIAM J. Numer. Anal. 35, 508–523), first while the hand moves, then while it stays.
 The medium becomes thinner where steps converge quickly, and thicker where they do not. Once hardly anything moves, the
-last step is solved without it: what is returned is an equilibrium, or was not found.
+last step is solved without it, or else with so little that it bears no more than what an equilibrium may leave over:
+what is returned is an equilibrium, or was not found.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from warpjld.simulation.bodies.model import ContactModel
 __all__ = ["EASED_SOLVES", "ROUGH", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
 
 Array = NDArray[np.float64]
-Step = Callable[[ContactSolution | None, float, Callable[[float], Loads] | None], ContactSolution]
-"""One load step: solution to start from, time, and loads instead of those without a medium."""
+Step = Callable[[ContactSolution | None, float, Callable[[float], Loads], bool], ContactSolution]
+"""One load step: solution to start from, time, loads, and whether it is exact and not only passed through."""
 
 EASED_SOLVES, UNEASED_SOLVES = 20, 16
 """Most linear solves of a step through the medium, and of one without it before the object is let give way."""
@@ -43,8 +44,9 @@ _MOMENT = 5e-4
 """Part of the load step that passes in a step in which the hand stays."""
 _MOVES, _STEPS, _FAILURES, _MOST = 4, 60, 4, 200
 """Steps while the hand moves, most while it stays, most that fail one after another, and most linear solves."""
-_RESTS, _FINER = 2e-2, 0.1
-"""Force of the medium over what presses at which an object rests, and factor on it where no equilibrium is found."""
+_RESTS, _NOTHING = 2e-2, 1e-4
+"""Force of the medium over what presses at which it is left out, and that which counts as none, as equilibria are found
+to no less: what rolls on two digits is held by nothing else."""
 
 
 def around_free_objects(model: ContactModel, since: float, time: float) -> Array | None:
@@ -74,7 +76,7 @@ def solve_eased(
     since = 0.0 if before is None else before.last.time
     moment = _MOMENT * (time - since)
     stays = time - (_STEPS + 1) * moment
-    here, found, drag, failures, rests, spent = before, before, _DRAG, 0, _RESTS, 0
+    here, found, drag, failures, spent, exact = before, before, _DRAG, 0, 0, False
     instants: list[ContactInstant] = []
     part = (stays - since) / _MOVES
     while spent < _MOST:
@@ -82,7 +84,7 @@ def solve_eased(
         ahead = min(now + part, stays) if stays - now > moment else now + moment
         if ahead >= time - 0.5 * moment:
             break
-        found = step(here, ahead, _dragged(loads, (ahead - now) * drag * around))
+        found = step(here, ahead, _dragged(loads, (ahead - now) * drag * around), exact)
         spent += found.spent
         if not found.converged:
             failures, drag = failures + 1, _STIFFER * drag
@@ -91,27 +93,36 @@ def solve_eased(
             if failures > _FAILURES:
                 break
             continue
-        was = 0.0 if here is None else here.last.displacement
-        way = np.linalg.norm(found.last.displacement - was, axis=1)
+        left = drag * _way(here, found, around)
         softer, failures = found.spent <= _FEW and failures == 0, 0
         # the correction of a step in which hardly anything moves says nothing of those to come
         here = replace(found, correction_rate=None)
         instants += found.instants
-        pushed = sum(float(np.linalg.norm(touch.nodal, axis=1).sum()) for touch in found.last.touches)
-        left = drag * float(around @ way)
-        if ahead > stays - 0.5 * moment and left <= rests * pushed:
-            found = step(here, time, None)
+        if ahead > stays - 0.5 * moment and left <= (_NOTHING if exact else _RESTS) * _pushes(found):
+            thin = drag if exact else 0.0
+            found = step(here, time, _dragged(loads, (time - ahead) * thin * around) if thin else loads, True)
             spent += found.spent
-            if found.converged:
+            if found.converged and thin * _way(here, found, around) <= _NOTHING * _pushes(found):
                 return replace(found, instants=(*instants, *found.instants), spent=spent)
-            if rests < _RESTS:
+            if exact:
                 break
-            rests *= _FINER
+            exact = True
         if softer:
             drag *= _SOFTER
     assert found is not None
     status = SolveStatus.MAX_ITERATIONS if found.converged else found.status
     return replace(found, status=status, spent=spent)
+
+
+def _way(before: ContactSolution | None, after: ContactSolution, around: Array) -> float:
+    """Mean way of free objects between two solutions [m]."""
+    was = 0.0 if before is None else before.last.displacement
+    return float(around @ np.linalg.norm(after.last.displacement - was, axis=1))
+
+
+def _pushes(solution: ContactSolution) -> float:
+    """Sum of the contact forces on all nodes [N]."""
+    return sum(float(np.linalg.norm(touch.nodal, axis=1).sum()) for touch in solution.last.touches)
 
 
 def _dragged(loads: Callable[[float], Loads], drag: Array) -> Callable[[float], Loads]:
