@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -98,6 +99,27 @@ def test_what_drifts_on_is_not_found() -> None:
     found = solve_eased(step, lambda time: Loads(), solution(2.0, 0.0), 3.0, AROUND)
     assert not found.converged
     assert found.spent <= 220
+
+
+def test_what_one_digit_pushes_away_is_let_go_once_it_is_hardly_touched() -> None:
+    """Its drift becomes slower and slower, and all that presses is what the medium resists with."""
+    taken = []
+
+    def step(
+        before: ContactSolution | None, time: float, loads: Callable[[float], Loads], exact: bool
+    ) -> ContactSolution:
+        assert before is not None
+        taken.append(time)
+        at, around = float(before.last.displacement[0, 0]), loads(time).drag
+        resists = 0.0 if around is None else float(around[0]) / (time - before.last.time)
+        to = (SPRING * 1e-3 + resists * at) / (SPRING + resists)
+        found = solution(time, to, solves=11)  # so that the medium does not become thinner
+        touch: Any = SimpleNamespace(nodal=np.array([[SPRING * (1e-3 - to), 0.0, 0.0]]))
+        return replace(found, instants=(replace(found.last, touches=(touch,)),))
+
+    found = solve_eased(step, lambda time: Loads(), solution(2.0, 0.0), 3.0, AROUND)
+    assert found.converged
+    assert len(taken) <= 22
 
 
 def test_steps_that_all_fail_end_it() -> None:

@@ -47,6 +47,9 @@ _MOVES, _STEPS, _FAILURES, _MOST = 4, 60, 4, 200
 _RESTS, _NOTHING = 2e-2, 1e-4
 """Force of the medium over what presses at which it is left out, and that which counts as none, as equilibria are found
 to no less: what rolls on two digits is held by nothing else."""
+_SLIGHT = 1e-3
+"""Sum of contact forces below which an object is hardly touched, and is let go at once [N]: what one digit pushes away
+drifts on for long."""
 
 
 def around_free_objects(model: ContactModel, since: float, time: float) -> Array | None:
@@ -98,7 +101,9 @@ def solve_eased(
         # the correction of a step in which hardly anything moves says nothing of those to come
         here = replace(found, correction_rate=None)
         instants += found.instants
-        if ahead > stays - 0.5 * moment and left <= (_NOTHING if exact else _RESTS) * _pushes(found):
+        pushes = _pushes(found)
+        rests = left <= _NOTHING * pushes if exact else left <= _RESTS * pushes or pushes <= _SLIGHT
+        if ahead > stays - 0.5 * moment and rests:
             thin = drag if exact else 0.0
             found = step(here, time, _dragged(loads, (time - ahead) * thin * around) if thin else loads, True)
             spent += found.spent
