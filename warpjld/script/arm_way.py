@@ -28,7 +28,7 @@ _MARGINS = (0.01, 0.03)
 """Added to the radii of the arm's spheres in searches for a way [m], since splines swing past their keys."""
 _OUTSIDE, _APPROACH = 0.04, 0.75
 """Distance from the body at which the arm is before it comes to its goal [m], and when, as a share of the time."""
-_NUDGES = 3  # largest number of keys that then move the arm out of the body where it still passes through
+_NUDGES = 2  # largest number of keys that then move the arm out of the body where it still passes through
 _NUDGE = 0.01  # added to the radii there, once more at each further key [m]
 _LOOKS = 61
 """Largest number of frames of the motion at which intersections of the arm with the body are looked for: every frame

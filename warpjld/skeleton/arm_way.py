@@ -18,8 +18,8 @@ from warpjld.skeleton.reach import Depths
 __all__ = ["way_between"]
 
 _SAMPLES = 1024  # postures that are tried
-_CLEAR = 256  # of those that clear the body, as many by which the ways are shortest are on the roadmap
-_NEIGHBOURS = 12  # to which each is joined
+_CLEAR = 192  # of those that clear the body, as many by which the ways are shortest are on the roadmap
+_NEIGHBOURS = 10  # to which each is joined
 _STEPS = 6  # postures on a way between two neighbours that are looked at
 _PENETRATION = 0.004
 """Root of the mean square of penetration along a way, per length of the arm, that weighs as much as a way twice as
