@@ -17,7 +17,7 @@ from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.arm_way import pierced_frames
 from warpjld.script.binding import cover
-from warpjld.script.grasping import Attempt
+from warpjld.script.grasping import Attempt, collisions
 from warpjld.script.staging import stage
 from warpjld.skeleton import DIGITS
 from warpjld.skeleton.arm import arm_of
@@ -200,6 +200,18 @@ def test_every_frame_of_a_way_is_looked_at(anny: Scene) -> None:
     arm = arm_of(actor.skeleton, "left")
     looked = pierced_frames(scene, actor, cover(actor), arm, 1.5, 6.0)
     assert list(looked) == [1.5, 2.0, 3.0, 4.0, 5.0, 6.0]
+
+
+def test_what_the_other_hand_touches_is_no_collision_of_this_one(anny: Scene) -> None:
+    scene = _fresh(anny)
+    actor = scene.actor()
+    x, y, z = actor.skeleton.rest[actor.skeleton.index("left.index.tip")]
+    Interpreter(scene).run_text(f"OBJECT HELD BALL 0.02 AT {x} {y} {z}\nOBJECT APPLE BALL 0.07 AT 0 0 3")
+    apple = scene.props["APPLE"]
+    for side in ("left", ""):
+        (text,) = collisions(scene, actor, apple, 0.0, 4.0, side)
+        assert "left.index" in text
+    assert collisions(scene, actor, apple, 0.0, 4.0, "right") == []
 
 
 @pytest.mark.slow

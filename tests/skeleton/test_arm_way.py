@@ -1,6 +1,8 @@
-"""A posture on the way leads an arm around what a straight way would pass through."""
+"""Postures on the way lead an arm around what a straight way would pass through."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +10,7 @@ from numpy.typing import NDArray
 from tests.motion.skeletons import body
 from warpjld.skeleton import rest_poses
 from warpjld.skeleton.arm import arm_of
-from warpjld.skeleton.arm_way import postures_between
+from warpjld.skeleton.arm_way import way_between
 
 
 def test_a_ball_in_the_way_is_gone_around() -> None:
@@ -28,9 +30,10 @@ def test_a_ball_in_the_way_is_gone_around() -> None:
         return np.maximum(radius - np.linalg.norm(positions[:, -1:] - ball, axis=2), 0.0)
 
     assert np.linalg.norm(wrists(first + share * (last - first)) - ball, axis=1).min() < 0.5 * radius
-    found = postures_between(arm, angles, pose, first, last, depths, 3)
-    assert len(found) == 3
-    best = found[0]
-    assert ((best >= low) & (best <= high)).all()
-    for a, b in ((first, best), (best, last)):
-        assert np.linalg.norm(wrists(a + share * (b - a)) - ball, axis=1).min() > 0.97 * radius
+    found = way_between(arm, angles, pose, first, last, depths)
+    way = [first, *found, last]
+    for a, b in pairwise(way):
+        assert ((b >= low) & (b <= high)).all()
+        assert np.linalg.norm(wrists(a + share * (b - a)) - ball, axis=1).min() > 0.9 * radius
+    # and where nothing is in the way it is straight
+    assert way_between(arm, angles, pose, first, last, lambda p, _r: np.zeros((len(p), 1))) == []

@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 __all__ = ["clear_way", "key_arm", "pierced_frames"]
 
-_TRIED = 3  # largest number of postures to go by that are tried
+_MARGINS = (0.01, 0.03)
+"""Added to the radii of the arm's spheres in searches for a way [m], since splines swing past their keys."""
 _OUTSIDE, _APPROACH = 0.04, 0.75
 """Distance from the body at which the arm is before it comes to its goal [m], and when, as a share of the time."""
-_NUDGES = 3  # largest number of keys that then move the arm out of the body where it still passes through
-_MARGIN = 0.01  # added to the radii of the arm's spheres on the way [m], since splines swing past their keys; once more
-# at each further key that moves the arm out
+_NUDGES = 2  # largest number of keys that then move the arm out of the body where it still passes through
+_NUDGE = 0.01  # added to the radii there, once more at each further key [m]
 _LOOKS = 61
 """Largest number of frames of the motion at which intersections of the arm with the body are looked for: every frame
 of a motion of two seconds."""
@@ -118,7 +118,7 @@ def _nudged(
             break
         worst = max(way, key=lambda frame: pierced[frame])
         poses, angles = posture(scene, actor, worst)
-        depths = ArmClearance(cover(actor), arm, poses).wider((1 + k) * _MARGIN)
+        depths = ArmClearance(cover(actor), arm, poses).wider((1 + k) * _NUDGE)
         key_arm(scene, actor, arm, worst, clear(arm, angles[0], poses, arm.values(angles[0]), depths))
         keyed.add(worst)
         pierced = pierced_frames(scene, actor, cover(actor), arm, first, last)
@@ -130,10 +130,10 @@ def _keys_around(
 ) -> Iterator[dict[float, NDArray[np.float64]]]:
     """Sets of keys by which the arm may go around the body: frames → its angles [rad], shape (n,).
 
-    The arm comes to its goal from further outside the body; and to there straight, or by a posture on the way.
+    The arm comes to its goal from further outside the body; and to there straight, or by postures on the way.
     """
     from warpjld.grasp.arm_clearance import ArmClearance
-    from warpjld.skeleton.arm_way import postures_between
+    from warpjld.skeleton.arm_way import way_between
     from warpjld.skeleton.reach import clear
 
     poses, angles = posture(scene, actor, last)
@@ -142,12 +142,11 @@ def _keys_around(
     outside = clear(arm, angles[0], poses, end, depths.wider(_OUTSIDE))
     before = _whole(first + _APPROACH * (last - first), first, last)
     yield {before: outside}
-    for values in postures_between(arm, angles[0], poses, start, outside, depths.wider(_MARGIN), _TRIED):
-        there, back = float(np.linalg.norm(values - start)), float(np.linalg.norm(outside - values))
-        yield {
-            _whole(first + (before - first) * there / max(there + back, 1e-9), first, before): values,
-            before: outside,
-        }
+    for margin in _MARGINS:
+        way = way_between(arm, angles[0], poses, start, outside, depths.wider(margin))
+        lengths = np.linalg.norm(np.diff([start, *way, outside], axis=0), axis=1)
+        times = first + (before - first) * np.cumsum(lengths) / lengths.sum()
+        yield {**dict(zip(times[:-1].tolist(), way, strict=True)), before: outside}
 
 
 def _whole(frame: float, first: float, last: float) -> float:

@@ -77,7 +77,10 @@ def grasp_by_itself(
     message = (
         f"the best of {found.tried} placements, posture {found.posture}: {len(found.touching)} digits touch; {inside}"
     )
-    others = [*collisions(scene, actor, prop, first, last), *_through_body(scene, actor, covering, side, first, last)]
+    others = [
+        *collisions(scene, actor, prop, first, last, side),
+        *_through_body(scene, actor, covering, side, first, last),
+    ]
     message += "".join(f"; {note}" for note in others)
     values = {
         "posture": found.posture,

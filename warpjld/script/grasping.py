@@ -190,7 +190,7 @@ def close_digits(
     if begun:
         message += f"; in the object before closing: {', '.join(begun)}"
     message += f"; {inside}"
-    others = collisions(scene, actor, prop, first, last)
+    others = collisions(scene, actor, prop, first, last, side)
     message += "".join(f"; {text}" for text in others)
     status = "INSIDE" if begun else ("CONVERGED" if touching.any() else "NO_CONTACT")
     depth = round(1e3 * float(closed.penetration[0]), 4)
@@ -198,8 +198,11 @@ def close_digits(
     return Attempt(f"GRASP {prop.name}", last, actor.name, prop.name, status, message, values)
 
 
-def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float) -> list[str]:
-    """Messages about other objects that the hand enters while it closes (R77)."""
+def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float, side: str = "") -> list[str]:
+    """Messages about other objects that the hand of a side enters while it closes, or with no side both (R77).
+
+    What the other arm and hand touch is no matter of this one: they may hold an object of their own.
+    """
     from warpjld.grasp.hand_object_gaps import HandObjectGaps
     from warpjld.grasp.obstacles import COLLIDES
 
@@ -216,6 +219,8 @@ def collisions(scene: Scene, actor: Actor, held: Prop, first: float, last: float
             depths = np.concatenate([shape.depths(skin[None]) for shape, skin in zip(shapes, skins, strict=True)])
         else:
             depths = both.depths(skins, prop_places(scene.actors, scene.rate, prop, frames))
+        others = {"left": "right.", "right": "left."}.get(side)
+        depths[:, [others is not None and part.startswith(others) for part in both.parts]] = 0.0
         frame, part = np.unravel_index(depths.argmax(), depths.shape)
         if depths[frame, part] > COLLIDES:
             depth = 1e3 * depths[frame, part]
