@@ -40,7 +40,7 @@ class FacetPairs:
         self.corner = number[slave.corners[facets[:, 0]]]
         self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
         self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
-        found = mortar.integrals(facets, slave.quads, mortar.master.quads, x, reach)
+        found = mortar.integrals_of(facets, x, reach)
         self._area = share[:, None] * found[:, :16].reshape(-1, 4, 4).sum(axis=2)
         change = mortar.derivatives(facets, x, reach)
         change *= share[:, None, None]
