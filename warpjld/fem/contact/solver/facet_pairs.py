@@ -49,18 +49,18 @@ class FacetPairs:
     def gaps(self, apart: Array) -> Any:
         """Derivatives of the gaps through weights and normals, ``csr_array`` (m, 3N), for the relative positions of the
         two sides at the points [m], shape (m, 3)."""
-        points, corner, at = self._points, self.corner, self._at
-        spread = np.matmul(self.own, at[:, None, :4]) - np.matmul(self.far, at[:, None, 4:])
+        points, corner = self._points, self.corner
         off, per_area = self._mortar.sliver_offset(points.sites, points.area)
         wider = self.own.sum(axis=3)
-        mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
+        along = np.matmul(points.normal[corner], self._at.transpose(0, 2, 1))  # of the pair's nodes along the normals
+        along[:, :, 4:] *= -1.0
         if self._mortar.offset is not None:
             share, by_area = self._mortar.sliver_share(points.sites, points.area)
-            offset = self._mortar.offset[self.column[:, ::3] // 3]
-            outside = np.einsum("pkab,pb->pka", self.own, offset[:, :4])
-            outside += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
-            mean += share[corner][:, None] * outside
+            along += share[corner][:, :, None] * self._mortar.offset[self.column[:, ::3] // 3][:, None]
             per_area = per_area - by_area * (abs(points.weights) @ self._mortar.offset)
+        mean = np.einsum("pkab,pab->pka", self.own, along[:, :, :4])
+        mean += np.einsum("pkab,pab->pka", self.far, along[:, :, 4:])
+        mean += (points.gap - off)[corner][:, None] * wider
         gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
         gap -= self._turned_along(apart, wider)
         where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
