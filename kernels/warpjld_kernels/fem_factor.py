@@ -245,9 +245,10 @@ def factorise(
 @wp.func_native(
     EIGHT
     + """
-    const int count = fronts.first.shape[0] - 1;
+    const int count = fronts.todo.shape[0];
     double* y = scratch.data;
-    for (int f = 0; f < count; ++f) {
+    for (int n = 0; n < count; ++n) {
+        const int f = fronts.todo.data[n];
         const int* row = fronts.rows.data + fronts.starts.data[f];
         const int own = fronts.first.data[f + 1] - fronts.first.data[f];
         const int all = fronts.starts.data[f + 1] - fronts.starts.data[f];
@@ -269,7 +270,8 @@ def factorise(
         for (int i = 0; i < all; ++i)
             for (int p = 0; p < 3; ++p) x.data[3 * row[i] + p] = y[3 * i + p];
     }
-    for (int f = count - 1; f >= 0; --f) {
+    for (int n = count - 1; n >= 0; --n) {
+        const int f = fronts.todo.data[n];
         const int* row = fronts.rows.data + fronts.starts.data[f];
         const int own = fronts.first.data[f + 1] - fronts.first.data[f];
         const int all = fronts.starts.data[f + 1] - fronts.starts.data[f];
@@ -318,5 +320,9 @@ def solve(
     # in and out
     x: wp.array(dtype=wp.float64),
 ):
-    """x ← (L Lᵀ)⁻¹ x in elimination order, as a launch of one row."""
+    """x ← (L Lᵀ)⁻¹ x in elimination order, as a launch of one row.
+
+    Of the fronts ``todo`` only, ascending, each with all fronts above it: x has to be 0 in the rows of the others, and
+    is not computed there.
+    """
     solve_all(fronts, factor, scratch, x)

@@ -132,3 +132,18 @@ def test_beside_a_non_symmetric_part_of_few_rows(size: float) -> None:
     assert done.iterations <= 13
     assert (done.x[~free] == 0.0).all()
     np.testing.assert_allclose(done.x[free], want, rtol=1e-6, atol=1e-7 * np.abs(want).max())
+
+
+def test_solving_between_some_degrees_of_freedom_takes_fewer_fronts_and_gives_the_same_bits() -> None:
+    matrix, free = _stiffness(box_hexes((3.0, 1.0, 1.0), (14, 5, 5)))
+    factor = Factor(matrix, free, threads=1)
+    face = np.flatnonzero(np.repeat(np.arange(matrix.size) < 6, 3))
+    rows, columns = face[1::2], np.concatenate([face[:5], [200, len(free) - 1]])
+    right = np.zeros(len(free))
+    right[rows[free[rows]]] = np.random.default_rng(5).normal(size=int(free[rows].sum()))
+    found = factor.between(rows, columns)(right[rows])
+    assert np.array_equal(found, factor.solve(right)[columns])
+    assert found.any()
+    fronts = factor.elimination.above(factor.elimination.place[[3, 5]])
+    assert 0 < len(fronts) < len(factor.elimination.parent)
+    assert set(factor.elimination.parent[fronts].tolist()) <= {*fronts.tolist(), -1}

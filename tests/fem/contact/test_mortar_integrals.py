@@ -54,9 +54,9 @@ def test_no_pair_that_counts_is_sorted_out() -> None:
         found = mortar.integrals(every, mortar.slave.quads, mortar.master.quads, x, reach)
         counted = found[:, 32] > 0.0
         assert 0 < counted.sum() < 0.7 * len(every)
-        pairs, integrals = mortar._facing(x, reach)
-        assert pairs.tobytes() == every[counted].tobytes()
-        assert integrals.tobytes() == found[counted].tobytes()
+        facing = mortar._facing(x, reach)
+        assert facing.pairs.tobytes() == every[counted].tobytes()
+        assert facing.integrals.tobytes() == found[counted].tobytes()
 
 
 def test_points_do_not_depend_on_what_was_asked_before() -> None:
@@ -74,3 +74,25 @@ def test_points_do_not_depend_on_what_was_asked_before() -> None:
             assert found.facets.tobytes() == fresh.facets.tobytes()
             assert found.gap.tobytes() == fresh.gap.tobytes()
             assert (found.weights != fresh.weights).nnz == 0
+
+
+def test_what_is_known_at_the_same_positions_is_not_computed_again() -> None:
+    mesh, mortar = _blocks(4)
+    x, reach, made = mesh.nodes, 0.6, []
+    integrals = mortar.integrals
+    mortar.integrals = lambda *given: made.append(len(given[0])) or integrals(*given)  # type: ignore[method-assign]
+    normals = mortar.slave.normals(x)
+    first = mortar.points(x, reach, normals, facing=True)
+    assert mortar.points(x.copy(), reach, normals.copy(), facing=True) is first
+    assert first.facets is not None
+    some = first.facets[::3]
+    known = mortar.integrals_of(some, x, reach)
+    assert len(made) == 1
+    assert known.tobytes() == integrals(some, mortar.slave.quads, mortar.master.quads, x, reach).tobytes()
+    tilted = normals + 0.2 * normals[::-1]
+    tilted /= np.linalg.norm(tilted, axis=1)[:, None]
+    for by, facing, there in [(tilted, False, x), (normals, False, x), (normals, True, 1.01 * x)]:
+        assert not np.allclose(mortar.points(there, reach, by, facing=facing).gap, first.gap, rtol=1e-4)
+    elsewhere = 1.02 * x
+    again = mortar.integrals_of(some, elsewhere, reach)
+    assert again.tobytes() == integrals(some, mortar.slave.quads, mortar.master.quads, elsewhere, reach).tobytes()

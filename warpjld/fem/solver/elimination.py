@@ -42,6 +42,7 @@ class Elimination:
         size: Number of values in the factor's panels.
         room: Largest number of values in update matrices at a time.
         work: Number of multiplications.
+        parent: Front that takes up each front's update matrix, -1 for none, shape (F,).
     """
 
     order: Ints32
@@ -52,6 +53,17 @@ class Elimination:
     size: int
     room: int
     work: float
+    parent: Ints
+
+    def above(self, positions: Ints) -> Ints:
+        """Fronts that eliminate the nodes at some positions of the order, and all fronts above these, ascending."""
+        needed = np.zeros(len(self.parent), dtype=bool)
+        new = np.unique(np.searchsorted(self.tables["first"], positions, side="right") - 1)
+        while len(new):
+            needed[new] = True
+            new = np.unique(self.parent[new])
+            new = new[(new >= 0) & ~needed[new]]
+        return np.flatnonzero(needed)
 
 
 def eliminate(rows: Ints32, columns: Ints32, active: Mask) -> Elimination:
@@ -182,7 +194,7 @@ def _tables(order: Ints32, place: Ints32, first: Ints, lists: list[Ints32]) -> E
     *early, late = parts
     ends = np.cumsum([0, *map(len, early)]).astype(np.int32)
     sides = (np.concatenate(early).astype(np.int32), ends), (late.astype(np.int32), np.array([0, len(late)], np.int32))
-    return Elimination(order, place, tables, *sides, int(panel[-1]), room, float(work.sum()))
+    return Elimination(order, place, tables, *sides, int(panel[-1]), room, float(work.sum()), parent)
 
 
 def _padded(count: Ints) -> Ints:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from warpjld.errors import WarpjldError
-from warpjld.fem.arrays import Array, Ints32, Mask
+from warpjld.fem.arrays import Array, Ints, Ints32, Mask
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError
 from warpjld.fem.launch import Launch, grouped, on_rows, shared
 from warpjld.fem.solver.elimination import Elimination, eliminate
@@ -65,14 +66,19 @@ class Factor:
     def _prepare(self) -> None:
         """Record the launch of the solve."""
         elimination = self.elimination
-        degrees = (3 * elimination.order[:, None].astype(np.int64) + np.arange(3)).ravel()
-        self._degrees = degrees
-        self._x = np.empty(len(degrees))
+        self._degrees = (3 * elimination.order[:, None].astype(np.int64) + np.arange(3)).ravel()
+        self._x = np.empty(len(self._degrees))
+        self._launch = self._solving(np.arange(len(elimination.tables["starts"]) - 1), self._x)
+
+    def _solving(self, fronts: Ints, x: Array) -> Launch:
+        """The launch that solves for x in elimination order (n,) with some fronts, ascending."""
         from warpjld_kernels import fem_factor
 
-        widest = int(np.diff(elimination.tables["starts"]).max(initial=0))
-        inputs = [self._fronts(elimination, elimination.late), shared(self._panels), shared(np.empty(3 * widest + 8))]
-        self._launch = Launch(fem_factor.solve, 1, [*inputs, shared(self._x)])
+        tables = self.elimination.tables
+        widest = int(np.diff(tables["starts"]).max(initial=0))
+        part = fronts.astype(np.int32), np.array([0, len(fronts)], np.int32)
+        inputs = [self._fronts(self.elimination, part), shared(self._panels), shared(np.empty(3 * widest + 8))]
+        return Launch(fem_factor.solve, 1, [*inputs, shared(x)])
 
     def solve(self, right: Array) -> Array:
         """Solution of K11 x = b, zero where prescribed, shape (3N,)."""
@@ -81,6 +87,35 @@ class Factor:
         out = np.zeros_like(right)
         out[self._degrees] = self._x
         return np.where(self._free, out, 0.0)
+
+    def between(self, rows: Ints, columns: Ints) -> Callable[[Array], Array]:
+        """Function of right-hand sides b that vanish outside some degrees of freedom, given at these (r,), to the
+        solution at others (c,); equal to that of ``solve`` to the last bit.
+
+        It takes only the fronts that eliminate them, and those above (paths of the elimination tree: Liu 1990, SIAM J.
+        Matrix Anal. Appl. 11, 134–172).
+
+        Args:
+            rows: Degrees of freedom at which b is given, shape (r,).
+            columns: Degrees of freedom at which x is wanted, shape (c,).
+        """
+        place = 3 * self.elimination.place.astype(np.int64)
+        inside = place[rows // 3] >= 0
+        at = place[rows // 3][inside] + rows[inside] % 3
+        wanted = self._free[columns] & (place[columns // 3] >= 0)
+        there = place[columns // 3][wanted] + columns[wanted] % 3
+        x = np.zeros(len(self._degrees))
+        launch = self._solving(self.elimination.above(np.concatenate([at, there]) // 3), x)
+
+        def solved(right: Array) -> Array:
+            x[:] = 0.0
+            x[at] = right[inside]
+            launch()
+            out = np.zeros(len(columns))
+            out[wanted] = x[there]
+            return out
+
+        return solved
 
     @staticmethod
     def _fronts(elimination: Elimination, part: tuple[Any, Any]) -> Any:

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
 from warpjld.errors import InputError
-from warpjld.fem.arrays import Array, Mask, norm
+from warpjld.fem.arrays import Array, Ints, Mask, norm
 from warpjld.fem.assembly.block_matrix import BlockMatrix, IndefiniteError, padded
 from warpjld.fem.launch import Launch, shared, threads_of
 from warpjld.fem.mesh.hexmesh import HexMesh
@@ -162,25 +162,25 @@ class LinearSolver:
         mask, solve = self._mask, self._factor.solve
         rows = np.flatnonzero(np.diff(nonsymmetric.indptr))
         part = nonsymmetric[rows]
-
-        def whole(y: Array) -> Array:
-            out = np.zeros_like(right)
-            out[rows] = y
-            return out
+        columns, at = np.unique(part.indices, return_inverse=True)
+        inner = csr_array((part.data, at, part.indptr), shape=(len(rows), len(columns)))
+        between = self._factor.between(rows, columns)
 
         def pushed(x: Array) -> Array:
-            return np.asarray(mask[rows] * (part @ x))
+            return np.asarray(mask[rows] * (inner @ x))
 
         x = solve(right)
-        start, size = pushed(x), norm(right)
+        start, size = pushed(x[columns]), norm(right)
         aim = tolerance * size
         done = Iteration(start, SolveStatus.CONVERGED, 0, 0.0, np.empty(0))
         if not norm(start) <= aim:
             aim /= norm(start)
             done = minimal_residuals(
-                lambda y: y + pushed(solve(whole(y))), lambda y: y, start, tolerance=aim, iterations=iterations
+                lambda y: y + pushed(between(y)), lambda y: y, start, tolerance=aim, iterations=iterations
             )
-            x = solve(right - whole(done.x))
+            less = right.copy()
+            less[rows] -= done.x
+            x = solve(less)
         left = norm(right - self.masked_product(x) - mask * (nonsymmetric @ x)) / max(size, 1e-300)
         status = done.status if np.isfinite(left) else SolveStatus.NOT_FINITE
         return replace(done, x=x, status=status, residual=left)
@@ -280,3 +280,13 @@ class _General:
         x = np.zeros_like(right)
         x[self._free] = self._factor.solve(right[self._free])
         return x
+
+    def between(self, rows: Ints, columns: Ints) -> Callable[[Array], Array]:
+        """As ``Factor.between``."""
+
+        def solved(right: Array) -> Array:
+            whole = np.zeros(len(self._free))
+            whole[rows] = right
+            return self.solve(whole)[columns]
+
+        return solved

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpjld.fem.arrays import Array, Ints, Ints32
+from warpjld.fem.contact.interface.contact_points import tangential
 from warpjld.geometry.rotations import unit
 
 __all__ = ["FacingParts"]
@@ -100,3 +101,15 @@ class FacingParts:
         length, n = np.linalg.norm(self.sum, axis=1), at(self.normals)
         out -= n * (n * out).sum(axis=-1)[..., None]
         return np.asarray(out / at(np.where(length > 0.0, length, 1.0)[:, None]))
+
+    def turned_along(self, vectors: Array) -> tuple[Array, Array, Array]:
+        """Derivatives of a·n by V_s (m, 3), V_m (m, 3) and A (m,), for a vector a (m, 3) at each point."""
+        mine, other = self.weights
+        length = np.linalg.norm(self.sum, axis=1)
+        across = tangential(vectors, self.normals) / np.where(length > 0.0, length, 1.0)[:, None]
+        safe = np.where(self.area > 0.0, self.area, 1.0)
+        one, two = (np.einsum("mi,mi->m", across, side) / safe for side in (self.slave, self.master))
+        by_slave = mine[:, None] * across + two[:, None] * unit(self.slave)
+        by_master = -other[:, None] * across - one[:, None] * unit(self.master)
+        sizes = [np.linalg.norm(side, axis=1) for side in (self.slave, self.master)]
+        return by_slave, by_master, (one * sizes[1] - two * sizes[0]) / safe

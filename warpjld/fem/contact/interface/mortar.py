@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -56,12 +56,14 @@ class _Near:
 
 @dataclass(frozen=True, eq=False)
 class _Facing:
-    """Facet pairs (P, 2) that face each other at positions x (N, 3) for a search distance, and their integrals."""
+    """Facet pairs (P, 2) that face each other at positions x (N, 3) for a search distance, and their integrals; and the
+    contact points found from them, with the arguments that these were found for."""
 
     x: Array
     reach: float
     pairs: Ints32
     integrals: Array
+    points: list[tuple[Array, bool, ContactPoints]] = field(default_factory=list)
 
 
 def _boxes(x: Array, surface: ContactSurface) -> tuple[Array, Array]:
@@ -132,9 +134,18 @@ class Mortar:
             facing: Whether points have instead the normals of those parts of both sides' faces that face each other
                 (``facing_normals``).
         """
-        slave, master = self.slave, self.master
-        pairs, found = self._facing(x, reach)
-        share = counted_share(self, pairs, found, normals, x, reach)
+        at = self._facing(x, reach)
+        for by, sort, points in at.points:  # line searches and their Newton steps end at the same positions
+            if sort == facing and np.array_equal(by, normals):
+                return points
+        points = self._found(at, normals, facing=facing)
+        at.points.append((normals.copy(), facing, points))
+        return points
+
+    def _found(self, at: _Facing, normals: Array, *, facing: bool) -> ContactPoints:
+        """Contact points of facet pairs; arguments as of ``points``."""
+        slave, master, x, pairs, found = self.slave, self.master, at.x, at.pairs, at.integrals
+        share = counted_share(self, pairs, found, normals, x, at.reach)
         counted = share > 0.0
         pairs, share = pairs[counted], share[counted]
         found = share[:, None] * found[counted]
@@ -194,16 +205,30 @@ class Mortar:
         t = (area - _LEAST * self.slave.edge[sites] ** 2) / whole
         return np.clip(t, 0.0, 1.0), np.where((t > 0.0) & (t < 1.0), 1.0 / whole, 0.0)
 
-    def _facing(self, x: Array, reach: float) -> tuple[Ints32, Array]:
+    def _facing(self, x: Array, reach: float) -> _Facing:
         """Facet pairs that face each other, and their integrals; the last results are cached."""
-        for known in reversed(self._last):
-            if known.reach == reach and np.array_equal(known.x, x):
-                return known.pairs, known.integrals
+        if (known := self._known(x, reach)) is not None:
+            return known
         pairs = self._worth_integrating(self._neighbours(x, reach), x, reach)
         found = self.integrals(pairs, self.slave.quads, self.master.quads, x, reach)
         overlapping = found[:, 32] > 0.0
         self._last = [*self._last[1 - _KEPT :], _Facing(x.copy(), reach, pairs[overlapping], found[overlapping])]
-        return self._last[-1].pairs, self._last[-1].integrals
+        return self._last[-1]
+
+    def _known(self, x: Array, reach: float) -> _Facing | None:
+        """What is cached for positions x (N, 3) and a search distance."""
+        same = (one for one in reversed(self._last) if one.reach == reach and np.array_equal(one.x, x))
+        return next(same, None)
+
+    def integrals_of(self, pairs: Ints32, x: Array, reach: float) -> Array:
+        """Mortar integrals of facet pairs (P, 2) of the surfaces at positions x (N, 3), shape (P, 33): those of the
+        contact points there, if these are known."""
+        if (known := self._known(x, reach)) is not None and len(known.pairs):
+            keys, wanted = (one @ np.array([len(self.master.quads), 1], np.int64) for one in (known.pairs, pairs))
+            at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+            if np.array_equal(keys[at], wanted):
+                return np.asarray(known.integrals[at])
+        return self.integrals(pairs, self.slave.quads, self.master.quads, x, reach)
 
     def _worth_integrating(self, pairs: Ints32, x: Array, reach: float) -> Ints32:
         """Those of the pairs (P, 2) whose integrals may differ from 0, by the spheres around their facets."""

@@ -247,10 +247,10 @@ def _by_mortar(
     assert mortar is not None
     count = len(points.sites)
     pairs = FacetPairs(mortar, points, rows, x, interface.reach)
-    turning = pairs.normals()
+    turning = pairs.normals(np.ones(len(points.sites), dtype=bool))
     table = block_table(points.weights)
     apart = points.weights @ x
-    gap = pairs.gaps() - inner_rows(apart) @ turning - inner_rows(points.normal) @ table
+    gap = pairs.gaps(apart) - inner_rows(points.normal) @ table
     slip = table + _weights_by(pairs, points, moved)
     three = (3 * rows[:, None] + np.arange(3)).ravel()
     assert gap.shape[0] == count

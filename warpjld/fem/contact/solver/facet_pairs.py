@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from warpjld.fem.arrays import Array, Ints, cross_matrix
+from warpjld.fem.arrays import Array, Ints, Mask, cross_matrix
 from warpjld.fem.contact.interface.common_normals import FacingParts
 from warpjld.fem.contact.interface.contact_points import ContactPoints
 from warpjld.fem.contact.interface.mortar import Mortar
@@ -39,27 +40,29 @@ class FacetPairs:
         self.corner = number[slave.corners[facets[:, 0]]]
         self.column = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
         self._mortar, self._points, self._at, self._size = mortar, points, x[nodes], x.size
-        found = mortar.integrals(facets, slave.quads, mortar.master.quads, x, reach)
+        found = mortar.integrals_of(facets, x, reach)
         self._area = share[:, None] * found[:, :16].reshape(-1, 4, 4).sum(axis=2)
         change = mortar.derivatives(facets, x, reach)
         change *= share[:, None, None]
         self.own, self.far = (change[:, :, k : k + 16].reshape(-1, 24, 4, 4) for k in (0, 16))
 
-    def gaps(self) -> Any:
-        """Derivatives of the gaps through the weights, ``csr_array`` (m, 3N)."""
-        points, corner, at = self._points, self.corner, self._at
-        spread = np.matmul(self.own, at[:, None, :4]) - np.matmul(self.far, at[:, None, 4:])
+    def gaps(self, apart: Array) -> Any:
+        """Derivatives of the gaps through weights and normals, ``csr_array`` (m, 3N), for the relative positions of the
+        two sides at the points [m], shape (m, 3)."""
+        points, corner = self._points, self.corner
         off, per_area = self._mortar.sliver_offset(points.sites, points.area)
         wider = self.own.sum(axis=3)
-        mean = np.einsum("pkai,pai->pka", spread, points.normal[corner]) + (points.gap - off)[corner][:, None] * wider
+        along = np.matmul(points.normal[corner], self._at.transpose(0, 2, 1))  # of the pair's nodes along the normals
+        along[:, :, 4:] *= -1.0
         if self._mortar.offset is not None:
             share, by_area = self._mortar.sliver_share(points.sites, points.area)
-            offset = self._mortar.offset[self.column[:, ::3] // 3]
-            outside = np.einsum("pkab,pb->pka", self.own, offset[:, :4])
-            outside += np.einsum("pkab,pb->pka", self.far, offset[:, 4:])
-            mean += share[corner][:, None] * outside
+            along += share[corner][:, :, None] * self._mortar.offset[self.column[:, ::3] // 3][:, None]
             per_area = per_area - by_area * (abs(points.weights) @ self._mortar.offset)
+        mean = np.einsum("pkab,pab->pka", self.own, along[:, :, :4])
+        mean += np.einsum("pkab,pab->pka", self.far, along[:, :, 4:])
+        mean += (points.gap - off)[corner][:, None] * wider
         gap = per_area[corner][:, None] * wider - mean / points.area[corner][:, None]
+        gap -= self._turned_along(apart, wider)
         where = np.broadcast_to(corner[:, None] >= 0, gap.shape)
         row = np.broadcast_to(corner[:, None], gap.shape)[where]
         column = np.broadcast_to(self.column[:, :, None], gap.shape)[where]
@@ -78,26 +81,49 @@ class FacetPairs:
         shape = (self._size, self._size)
         return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
 
-    def normals(self) -> Any:
-        """Derivatives of the points' normals (``Mortar.facing_normals``), ``csr_array`` (3m, 3N)."""
-        points, corner = self._points, self.corner
-        count, known = len(points.sites), corner >= 0
-        wider = self.own.sum(axis=3)
-        sides, changes = [], []
-        for k in (0, 1):
-            normal, turned = _facet_normals(self._at[:, 4 * k : 4 * k + 4])
-            change = wider[:, :, :, None] * normal[:, None, None]
-            change[:, 12 * k : 12 * k + 12] += self._area[:, None, :, None] * turned[:, :, None]
-            sides.append(normal)
+    def normals(self, chosen: Mask) -> Any:
+        """Derivatives of the normals (``Mortar.facing_normals``) of chosen points (m,), ``csr_array`` (3m, 3N)."""
+        known = (self.corner >= 0) & chosen[self.corner]
+        some = known.any(axis=1)
+        known, corner, area, column = known[some], self.corner[some], self._area[some], self.column[some]
+        wider = self.own[some].sum(axis=3)
+        changes = []
+        for k, (normal, turned) in enumerate(self._facets):
+            change = wider[:, :, :, None] * normal[some, None, None]
+            change[:, 12 * k : 12 * k + 12] += area[:, None, :, None] * turned[some, :, None]
             changes.append(change.transpose(0, 2, 1, 3))
-        share = np.where(known, self._area, 0.0)
-        parts = FacingParts.of(np.maximum(corner, 0), count, share, sides[0], sides[1])
-        change = parts.turned(corner, changes[0], changes[1], wider.transpose(0, 2, 1)).transpose(0, 2, 1, 3)
+        change = self._facing.turned(corner, changes[0], changes[1], wider.transpose(0, 2, 1)).transpose(0, 2, 1, 3)
         used = np.broadcast_to(known[:, None, :, None], change.shape)
         row = np.broadcast_to((3 * corner[:, :, None] + np.arange(3))[:, None], change.shape)
-        column = np.broadcast_to(self.column[:, :, None, None], change.shape)
-        shape = (3 * count, self._size)
+        column = np.broadcast_to(column[:, :, None, None], change.shape)
+        shape = (3 * len(chosen), self._size)
         return csr_array(coo_array((change[used], (row[used], column[used])), shape=shape))
+
+    @cached_property
+    def _facets(self) -> list[tuple[Array, Array]]:
+        """Unit normals of the slave's and the master's facets, and their derivatives (``_facet_normals``)."""
+        return [_facet_normals(self._at[:, 4 * k : 4 * k + 4]) for k in (0, 1)]
+
+    @cached_property
+    def _facing(self) -> FacingParts:
+        """What the points' normals are made of."""
+        share = np.where(self.corner >= 0, self._area, 0.0)
+        normals = [normal for normal, _ in self._facets]
+        return FacingParts.of(np.maximum(self.corner, 0), len(self._points.sites), share, normals[0], normals[1])
+
+    def _turned_along(self, vectors: Array, wider: Array) -> Array:
+        """Derivatives of the normals at the corners, along a vector at each point (m, 3), shape (P, 24, 4).
+
+        ``wider`` are those of the corners' areas, likewise.
+        """
+        *sides, by_area = self._facing.turned_along(vectors)
+        total = by_area[self.corner]
+        each = []
+        for (normal, turned), side in zip(self._facets, sides, strict=True):
+            along = side[self.corner]
+            total = total + np.einsum("pai,pi->pa", along, normal)
+            each.append(self._area[:, None] * np.matmul(turned, along.transpose(0, 2, 1)))
+        return np.asarray(wider * total[:, None] + np.concatenate(each, axis=1))
 
 
 def _facet_normals(at: Array) -> tuple[Array, Array]:

@@ -154,16 +154,15 @@ def linearise_mortar(
     edge = mortar.slave.edge[points.sites]
     rows = np.flatnonzero(tractions.active | (points.gap < _NEAR * edge))
     pairs = FacetPairs(mortar, points, rows, x, reach)
-    turning = pairs.normals()
     pressure = np.where(tractions.active, np.maximum(state.pressure[points.sites], 0.0), 0.0)
     carried = np.where(tractions.active[:, None], state.friction[points.sites], 0.0)
     of_weights = pairs.forces(carried - pressure[:, None] * points.normal)
-    change = -diags_array(np.repeat(pressure, 3)) @ turning
+    change = -diags_array(np.repeat(pressure, 3)) @ pairs.normals(pressure > 0.0)
     of_gap = csr_array((len(edge), x.size))
     if not (tractions.error > _DEEP * edge).any():
         apart = np.zeros_like(points.normal)
         apart[pairs.rows] = (points.weights @ x)[pairs.rows]
-        of_gap = csr_array(pairs.gaps() - inner_rows(apart) @ turning)
+        of_gap = pairs.gaps(apart)
         stiff = np.where(tractions.active, penalty, 0.0)
         change = change + inner_rows(points.normal).T @ (diags_array(stiff) @ of_gap)
     spreading = block_table(points.weights.T @ diags_array(points.area))
