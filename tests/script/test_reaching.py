@@ -10,10 +10,12 @@ import pytest
 
 from warpjld.errors import InputError
 from warpjld.geometry.winding import winding_numbers
+from warpjld.grasp.arm_clearance import pierced_faces
 from warpjld.grasp.palm import palm_of
 from warpjld.io import load_rig
 from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
+from warpjld.script.arm_way import pierced_frames
 from warpjld.script.binding import cover
 from warpjld.script.grasping import Attempt
 from warpjld.script.staging import stage
@@ -175,6 +177,29 @@ def check_reach(scene: Scene, side: str, place: np.ndarray, attempt: Attempt) ->
     whole = below | np.array([name == f"{side}.shoulder" for name in ends])
     trunk = faces[~whole[faces].any(axis=1)]
     assert not (winding_numbers(skin, trunk, skin[below]) > 0.5).any()
+
+
+@pytest.mark.slow
+def test_the_way_behind_the_shoulder_leads_around_the_body(anny: Scene) -> None:
+    """Straight from hanging to behind the shoulder, forearm and hand would pass through the trunk."""
+    scene = _fresh(anny)
+    actor = scene.actor()
+    x, y, z = actor.skeleton.rest[actor.skeleton.index("left.shoulder")] + [0.0, -0.05, -0.3]
+    Interpreter(scene).run_text(f"REACH 0 20 LEFT AT {x} {y} {z} WITH INDEX")
+    (attempt,) = scene.attempts
+    assert attempt.status == "CONVERGED"
+    assert not attempt.values["pierced_faces"], attempt.message
+    covering, arm = cover(actor), arm_of(actor.skeleton, "left")
+    for skin in covering.deform(stage(actor, np.arange(0.0, 20.1, 0.5), scene.rate)):
+        assert not len(pierced_faces(covering, arm, skin))
+
+
+def test_every_frame_of_a_way_is_looked_at(anny: Scene) -> None:
+    scene = _fresh(anny)
+    actor = scene.actor()
+    arm = arm_of(actor.skeleton, "left")
+    looked = pierced_frames(scene, actor, cover(actor), arm, 1.5, 6.0)
+    assert list(looked) == [1.5, 2.0, 3.0, 4.0, 5.0, 6.0]
 
 
 @pytest.mark.slow

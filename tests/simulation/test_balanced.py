@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import run_contact
+from warpjld.simulation.grip import balanced as module
 from warpjld.simulation.grip.balanced import opposed_scales
 from warpjld.simulation.report.balance import balances
 from warpjld.simulation.solve_result import SolveResult
@@ -55,6 +58,38 @@ def test_one_direction_cannot_be_balanced() -> None:
     scales, left = scaled(forces, at, np.zeros(6), 4.0)
     np.testing.assert_allclose(scales, 2.0, atol=1e-6)
     assert left[1] == pytest.approx(-4.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "best"),
+    [
+        ([(3.9, 0.1), (4.0, 0.3), (3.95, 0.2), (4.09, 0.0)], 3.95),  # of those with 4 N the best balanced one
+        ([(2.0, 0.1), (3.5, 0.9), (3.8, 1.1)], 3.5),  # else the firmest that is balanced
+        ([(3.9, 1.2), (4.5, 0.2)], None),
+    ],
+)
+def test_which_of_the_grips_found_is_taken(
+    found: list[tuple[float, float]], best: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Grips with the force of one digit [N], and what is left over of 1 N that may be."""
+    monkeypatch.setattr(module, "worst_opposed", lambda _, left, name: SimpleNamespace(net=left))
+    monkeypatch.setattr(module, "allowed_left", lambda balance: 1.0)
+    digits = {force: SimpleNamespace(force=force, share=0.1) for force, _ in found}
+
+    class Pressed(SimpleNamespace):
+        def __getitem__(self, name: str) -> SimpleNamespace:
+            return self.digits[0]  # type: ignore[no-any-return]
+
+    each: Any = SimpleNamespace(
+        found=[(np.array([force]), left) for force, left in found],
+        effort=lambda grips, left: Pressed(digits=[digits[grips[0]]]),
+        angles=lambda grips: np.zeros((1, 4)),
+        model=None,
+        digits=("thumb",),
+        joints=[[0]],
+    )
+    taken = module._firmest(each, SimpleNamespace(object="BOX"), 4.0)  # type: ignore[arg-type]
+    assert (None if taken is None else taken.forces.sum()) == best
 
 
 def squeezed(flesh: str) -> SolveResult:

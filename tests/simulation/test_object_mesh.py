@@ -83,6 +83,17 @@ def test_a_pressurised_ball_keeps_its_shape() -> None:
     assert moved[0] < 1e-4
 
 
+def test_thin_walls_get_elements_small_enough() -> None:
+    """Elements of 16 mm leave out a wall of 6 mm: they are smaller, and the object weighs what it does."""
+    thing = glass(0.05, 0.05, thickness=0.006)
+    found = made(thing, element=0.016, density=400.0)
+    assert any("would leave out thin parts: they are 0.01 m" in note for note in found.notes)
+    assert any("of the object's volume" in note for note in found.notes)
+    assert found.physical.density * volumes(found.mesh).sum() == pytest.approx(400.0 * thing.volume, rel=1e-6)
+    assert found.visible.outside.max() <= 3.0
+    assert not any("would leave out" in note for note in made(thing, element=0.012).notes)
+
+
 def test_volumes_that_cannot_be() -> None:
     with pytest.raises(InputError, match=r"elements of 0\.02 m are too large|too coarse"):
         made(glass(), element=0.02)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from warpjld.errors import InputError
 from warpjld.simulation.grip.force import ForceStatus
-from warpjld.simulation.grip.shared_force import PressedDigits, SharedGrip, share_force
+from warpjld.simulation.grip.pressed_digits import PressedDigits
+from warpjld.simulation.grip.shared_force import SharedGrip, share_force
 
 Array = NDArray[np.float64]
 
@@ -231,3 +232,37 @@ def test_wrong_numbers_are_refused(change: dict[str, object], message: str) -> N
     wanted: dict[str, object] = {"low": [-1.0, -1.0], "high": [1.0, 1.0], "strengths": [1.0, 1.0], "force": 1.0}
     with pytest.raises(InputError, match=message):
         share_force(pads(np.zeros(2)), **{"start": 0.01} | wanted | change)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("promised", [2.0, 3.0])
+def test_slopes_that_promise_too_much_are_corrected_by_what_came_of_them(promised: float) -> None:
+    """Slopes are those of skin that sticks; where it slips as a digit closes on, its force rises by less."""
+    press = pads(np.array([-3e-3, -1e-3, -2e-3, -4e-3, -2e-3]))
+
+    def slipping(grips: Array) -> PressedDigits:
+        found = press(grips)
+        assert found.slopes is not None
+        return PressedDigits(found.forces, found.shares, promised * found.slopes)
+
+    found = shared(slipping, 40.0)
+    assert found.status is ForceStatus.REACHED
+    assert len(found.trials) <= 8
+
+
+def test_a_digit_that_should_hardly_press_does_not_keep_the_search_going() -> None:
+    """The last is to press with a hundredth of what others do, and presses with what the first presses on it."""
+    strengths = np.array([2.0, 1.0, 1.0, 0.01])
+    press = pads(np.array([-3e-3, -1e-3, -2e-3, -4e-3]), strengths=strengths)
+
+    def carried(grips: Array) -> PressedDigits:
+        found = press(grips)
+        assert found.slopes is not None
+        forces, shares, slopes = found.forces.copy(), found.shares.copy(), found.slopes.copy()
+        forces[3] = 0.05 * forces[0]
+        shares[3] = forces[3] / strengths[3]
+        slopes[3] = 0.1
+        return PressedDigits(forces, shares, slopes, load=0.1)
+
+    found = shared(carried, 3.0, strengths=strengths, even=0.25)  # type: ignore[arg-type]
+    assert found.status is ForceStatus.REACHED
+    assert len(found.trials) <= 6

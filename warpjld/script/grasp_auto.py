@@ -129,7 +129,7 @@ def carry(scene: Scene, actor: Actor, found: AutoGrasp, frames: tuple[float, flo
 
 def _through_body(scene: Scene, actor: Actor, covering: Covering, side: str, first: float, last: float) -> list[str]:
     """Message about the frames at which the arm of a body passes through the rest of it; empty if there are none."""
-    from warpjld.script.reaching import pierced_frames
+    from warpjld.script.arm_way import pierced_frames
     from warpjld.skeleton.arm import arm_of
 
     if f"{side}.shoulder" not in actor.skeleton.names:
@@ -151,9 +151,9 @@ def _by_arm(
     digits: Sequence[str],
 ) -> AutoGrasp:
     """Find a grasp within the arm's reach, and set the arm's keys: in front of the object, then at it."""
+    from warpjld.script.arm_way import key_arm
     from warpjld.script.grasp_by_arm import grasp_in_reach
     from warpjld.script.grasping import posture
-    from warpjld.script.reaching import key_arm
 
     first, middle, last = frames
     found = grasp_in_reach(

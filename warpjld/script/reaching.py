@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.geometry.rotations import unit
+from warpjld.script.arm_way import clear_way, key_arm, pierced_frames
 from warpjld.script.binding import cover
 from warpjld.script.grasping import Attempt, placed_at, posture
-from warpjld.script.staging import stage
-from warpjld.skeleton import CHANNELS, Poses, poses_from_angles
+from warpjld.skeleton import Poses, poses_from_angles
 
 if TYPE_CHECKING:
     from warpjld.covering import Covering
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from warpjld.skeleton.arm import Arm
     from warpjld.skeleton.reach import Reached
 
-__all__ = ["REACHED", "Goal", "arm_to_hand", "key_arm", "nearest_side", "pierced_frames", "reach_for"]
+__all__ = ["REACHED", "Goal", "arm_to_hand", "nearest_side", "reach_for"]
 
 REACHED = 0.002
 """Distance up to which a goal counts as reached [m]."""
@@ -32,9 +32,6 @@ _SETTLED = 2e-4  # change of the skin's offset from the wrist at which the itera
 _MARGINS = (0.0, 0.01, 0.02)
 """Added to the radii of the arm's spheres [m] in searches that put the body's skin before the target, one after another
 as long as the arm's skin passes through it: spheres have the arm's thin side."""
-_WAY_KEYS = 3  # largest number of keys that are set on the way to keep the arm out of the body
-_WAY_MARGIN = 0.01  # added to the radii there, since splines swing past their keys [m]
-_LOOKS = 7  # frames of the motion at which intersections of the arm with the body are looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +75,7 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
         pierced = pierced_frames(scene, actor, covering, arm, first, last)
         if not pierced[last]:
             break
-    pierced = _cleared_way(scene, actor, arm, first, last, pierced)
+    pierced = clear_way(scene, actor, arm, first, last, pierced)
     short = float(np.linalg.norm(at - goal.place))
     status = "CONVERGED" if short <= REACHED else "SHORT"
     if pierced[last]:
@@ -92,50 +89,6 @@ def reach_for(scene: Scene, actor: Actor, side: str, first: float, last: float, 
     if status != "CONVERGED":
         scene.warned([f"{actor.name}: REACH {goal.name} at frame {last:g}: {message}"])
     return Attempt(f"REACH {goal.name}", last, actor.name, goal.object, status, message, values)
-
-
-def _cleared_way(
-    scene: Scene, actor: Actor, arm: Arm, first: float, last: float, pierced: dict[float, int]
-) -> dict[float, int]:
-    """Set keys between two frames at which the arm would pass through the body, until it does not or none helps.
-
-    Returns:
-        Faces that are passed through, by frame, as of ``pierced_frames``.
-    """
-    from warpjld.grasp.arm_clearance import ArmClearance
-    from warpjld.skeleton.reach import clear
-
-    covering = cover(actor)
-    keyed: set[float] = set()
-    while (way := [f for f in _on_the_way(pierced, last) if f not in (first, *keyed)]) and len(keyed) < _WAY_KEYS:
-        worst = max(way, key=lambda frame: pierced[frame])
-        poses, angles = posture(scene, actor, worst)
-        depths = ArmClearance(covering, arm, poses).wider(_WAY_MARGIN)
-        key_arm(scene, actor, arm, worst, clear(arm, angles[0], poses, arm.values(angles[0]), depths))
-        keyed.add(worst)
-        pierced = pierced_frames(scene, actor, covering, arm, first, last)
-    return pierced
-
-
-def key_arm(scene: Scene, actor: Actor, arm: Arm, frame: float, values: NDArray[np.float64]) -> None:
-    """Set keys of all free angles of an arm [rad]."""
-    for (k, column), value in zip(arm.free.tolist(), values.tolist(), strict=True):
-        actor.set_keys(f"{actor.skeleton.names[arm.joints[k]]}.{CHANNELS[column]}", [frame], value, scene.spline)
-
-
-def pierced_frames(
-    scene: Scene, actor: Actor, covering: Covering, arm: Arm, first: float, last: float
-) -> dict[float, int]:
-    """Number of faces of the body that an arm passes through, by frame."""
-    from warpjld.grasp.arm_clearance import pierced_faces
-
-    frames = np.linspace(first, last, _LOOKS)
-    skins = covering.deform(stage(actor, frames, scene.rate))
-    return {f: len(pierced_faces(covering, arm, skin)) for f, skin in zip(frames.tolist(), skins, strict=True)}
-
-
-def _on_the_way(pierced: dict[float, int], last: float) -> list[float]:
-    return [frame for frame, count in pierced.items() if count and frame != last]
 
 
 def arm_to_hand(
@@ -246,6 +199,6 @@ def _message(goal: Goal, short: float, found: Reached, pierced: dict[float, int]
         text += f"; the palm is turned {math.degrees(found.off):.0f}° from it"
     if pierced[last]:
         text += f"; the arm passes through {pierced[last]} faces of the body"
-    if way := _on_the_way(pierced, last):
-        text += f"; on its way the arm passes through the body at frame {', '.join(f'{frame:.4g}' for frame in way)}"
+    if way := [f"{frame:.4g}" for frame, count in pierced.items() if count and frame != last]:
+        text += f"; on its way the arm passes through the body at frame {', '.join(way)}"
     return text

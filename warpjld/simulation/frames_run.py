@@ -129,8 +129,9 @@ class FramesRun:
             driven = model
             if (inside := self._bone_inside(model, steps)) is not None:
                 return self.ended(SolveStatus.BLOCKED, inside)
+            eases = self.request.method != "paper"
             solution = self._handed_over(since, steps) or solve_onward(
-                model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken
+                model, self.history, before, steps, method=self.request.method, aitken=self.request.aitken, ease=eases
             )
         if not solution.converged:
             ahead = [self._bone_inside(driven, [step]) for step in steps if step > solution.last.time]

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem import Body, HexMesh, LinearElastic, Loads, Prescribed, ball_hexes, box_hexes, cylinder_hexes, solve
 from warpjld.fem.mesh.embedding import Embedding, embed
-from warpjld.fem.mesh.envelope import Envelope
-from warpjld.fem.mesh.fit import fit_mesh
 from warpjld.fem.output.stress import cauchy
 from warpjld.files.kept_values import hash_of, kept_value
 from warpjld.geometry.rotations import unit
 from warpjld.grasp.objects import GraspObject, Places, VolumeCells
+from warpjld.simulation.bodies.fitted_object import FittedObject, fitted_object
 from warpjld.simulation.bodies.kept_sources import MESHING
 from warpjld.simulation.specification import ObjectMaterial
 from warpjld.simulation.volume_object import meshed_cells
@@ -90,8 +89,7 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
     Raises:
         InputError: Elements too large for it, a wall too thick, or a pressure its wall cannot hold.
     """
-    shape = replace(physical, where=None, prestress=(0.0,) * 6)
-    shape = replace(shape, regions=())
+    shape = replace(physical, where=None, prestress=(0.0,) * 6, regions=())
     cells = None if thing.cells is None else (thing.cells.nodes, thing.cells.elements, thing.cells.regions)
     key = hash_of(name, thing.origin, thing.size, thing.vertices, thing.faces, shape, cells)
     classes = (_Local, HexMesh, Embedding)
@@ -102,23 +100,25 @@ def mesh_object(name: str, thing: GraspObject, physical: ObjectMaterial, place: 
         name,
         moved,
         local.mesh.nodes,
-        physical,
+        replace(physical, density=local.heavier * physical.density),
         local.visible,
         place.apply(thing.vertices)[0],
         thing.faces,
         _turned(local.stress + np.array(physical.prestress), turn.T),
-        notes,
+        (*local.notes, *notes),
         () if thing.cells is None else thing.cells.region_names,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Local:
-    """Mesh, embedding and initial stress in the object's own frame, which are cached."""
+    """Mesh, embedding and initial stress in the object's own frame, which are cached; see ``FittedObject``."""
 
     mesh: HexMesh
     visible: Embedding
     stress: NDArray[np.float64]
+    heavier: float = 1.0
+    notes: tuple[str, ...] = ()
 
 
 def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
@@ -127,6 +127,8 @@ def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
         return _from_cells(name, thing, thing.cells, physical)
     size = physical.element or float(thing.size.min()) / _ACROSS
     _refuse_many(thing, physical.wall, size)
+    thin = min(1.0, physical.wall / (_WALL * size)) if physical.wall else 1.0
+    fit: FittedObject | None = None
     if thing.origin == "ball":
         mesh = _ball(thing, physical.wall, size)
     else:
@@ -136,7 +138,8 @@ def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
         elif thing.origin == "cylinder" and not physical.wall:  # its faces are narrow at the rims
             mesh = _cylinder(thing, size)
         else:
-            mesh = fit_mesh(Envelope(thing.vertices, thing.faces), size).mesh
+            fit = fitted_object(thing, size, np.inf if physical.wall else _REACH)
+            mesh = fit.mesh
         mesh = _shell(mesh, physical.wall) if physical.wall else replace(mesh, faces={"outer": mesh.boundary()})
     faces = {name: mesh.faces["outer"]}
     if physical.wall:
@@ -145,12 +148,13 @@ def _meshed(name: str, thing: GraspObject, physical: ObjectMaterial) -> _Local:
         mesh, regions=np.zeros(len(mesh.elements), np.int32), region_names=(name,), faces=faces, node_sets={}
     )
     stress = _holding(mesh, f"{name}.inside", physical) if physical.pressure else np.zeros((len(mesh.elements), 6))
+    if fit is not None and not physical.wall:
+        return _Local(mesh, fit.visible, stress, fit.heavier, fit.notes)
     try:
-        thin = min(1.0, physical.wall / (_WALL * size)) if physical.wall else 1.0
         visible = embed(mesh, thing.vertices, reach=_REACH / thin)
     except InputError as error:
         raise InputError(f"elements of {size:g} m are too large, thin parts are left out ({error.message})") from error
-    return _Local(mesh, visible, stress)
+    return _Local(mesh, visible, stress, notes=() if fit is None else fit.notes)
 
 
 def _from_cells(name: str, thing: GraspObject, cells: VolumeCells, physical: ObjectMaterial) -> _Local:

@@ -22,9 +22,10 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.digit_squeeze import DigitSqueeze
 from warpjld.simulation.grip.force import ForceStatus
 from warpjld.simulation.grip.found import FoundGrip, digits_that_press
-from warpjld.simulation.grip.opposed import allowed_left, worst_opposed
+from warpjld.simulation.grip.opposed import allowed_left, firmest_allowed, left_ratio, worst_opposed
+from warpjld.simulation.grip.pressed_digits import PressedDigits
 from warpjld.simulation.grip.search_budget import SearchBudget
-from warpjld.simulation.grip.shared_force import PressedDigits, share_force
+from warpjld.simulation.grip.shared_force import share_force
 from warpjld.simulation.grip.squeeze import Squeeze
 from warpjld.simulation.report.balance import ObjectBalance
 from warpjld.simulation.specification import GripSpecification
@@ -50,6 +51,10 @@ _ROUNDS = 2
 """Most distributions: directions of forces change as digits close, and are not known before a digit presses."""
 _REACHED = 1.03
 """Force over the one asked for that counts as the same, as searches find it within 2 %."""
+_SHORT = 0.97
+"""Force over the one asked for below which a part of closings that are not balanced is looked for."""
+_ASKED = 0.02
+"""Relative difference from the force asked for within which a grip presses with it."""
 _SPARE = 2.0
 """Force at which the share of a digit is 1, over the force it should have: shares stay below 1, as those of muscles."""
 
@@ -133,7 +138,7 @@ def balanced_grip(
     each = DigitSqueeze(model, squeeze.history, hand, taking, squeeze.first, squeeze.limits, SearchBudget())
     low, high = each.range(request.most)
     high[each.touch > high] = 0.0  # a digit that touches nothing stays as it is
-    grips = np.full(len(taking), grip)
+    grips, last = np.full(len(taking), grip), None
     for alike in squeeze.known:
         each.note(np.full(len(taking), alike), squeeze.angles(alike), squeeze.closed(alike))
     for _ in range(_ROUNDS if len(taking) > 1 else 0):
@@ -142,24 +147,46 @@ def balanced_grip(
             break
         each.wanted = _SPARE * wanted
         press, strengths, touch = _telling(each, wanted, tell), each.wanted, each.touch
-        found = share_force(press, low, high, strengths, force, start=start, even=_EVEN, begin=grips, touch=touch)
-        known = each.known(found.grips)
-        if known is None or found.status not in (ForceStatus.REACHED, ForceStatus.UNEVEN):
+        spent = each.spent
+        found = share_force(
+            press, low, high, strengths, force, start=start, even=_EVEN, begin=grips, touch=touch, exhausted=spent
+        )
+        there = each.known(found.grips)
+        if there is None or found.status not in (ForceStatus.REACHED, ForceStatus.UNEVEN):
             break
-        effort, instant, grips = each.effort(found.grips, known), known, found.grips
+        effort, instant, grips = each.effort(found.grips, there), there, found.grips
+        last = grips
         after = worst_opposed(model, instant, before.object)
         if after is None or max(one.share for one in effort.digits) > 1.0 or not after.net < _LOWER * balance.net:
             break
         if after.net <= allowed_left(after):
             break
         balance = after
-    return _firmest(each, before, force)
+    best = _firmest(each, before, force)
+    if last is not None and (best is None or best.forces.sum() < _SHORT * force):
+        _ease(each, last, before.object, tell)
+        best = _firmest(each, before, force)
+    return best
+
+
+def _ease(each: DigitSqueeze, grips: Array, name: str, tell: Callable[[str], None]) -> None:
+    """Look for the firmest part of closings (D,) [rad] at which a rigid object is balanced, as they come nearer to that
+    than equal ones."""
+
+    def ratio(part: float) -> float:
+        return left_ratio(each.model, each.solved_at(part * grips), name)
+
+    def say(part: float, found: float) -> None:
+        tell(f"{100.0 * part:.0f} % of these closings: {found:.2f} of what may be left over on {name}")
+
+    firmest_allowed(ratio, [0.0, 1.0], 1.0, say)
 
 
 def _firmest(each: DigitSqueeze, before: ObjectBalance, force: float) -> BalancedGrip | None:
-    """The grip found that presses with most, but not with more than ``force`` [N] or than muscles can, and balances the
-    object; None if there is none."""
-    best = None
+    """The grip found that balances the object and presses with ``force`` [N], and of those the best balanced one; or
+    else the one that presses with most, but not with more than that, or than muscles can; None if there is none."""
+    best: BalancedGrip | None = None
+    most = (False, 0.0)
     for grips, instant in each.found:
         after = worst_opposed(each.model, instant, before.object)
         if after is None or after.net > allowed_left(after):
@@ -167,7 +194,10 @@ def _firmest(each: DigitSqueeze, before: ObjectBalance, force: float) -> Balance
         effort = each.effort(grips, instant)
         forces = np.array([effort[digit].force for digit in each.digits])
         over = forces.sum() > _REACHED * force or max(one.share for one in effort.digits) > 1.0
-        if not over and (best is None or forces.sum() > best.forces.sum()):
+        as_asked = bool(abs(forces.sum() / force - 1.0) <= _ASKED)
+        good = (as_asked, -after.net if as_asked else float(forces.sum()))
+        if not over and (best is None or good > most):
+            most = good
             best = BalancedGrip(each.digits, each.joints, grips, forces, each.angles(grips), effort, before, after)
     return best
 

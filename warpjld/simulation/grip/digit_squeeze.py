@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,9 @@ from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.bone_room import bone_room
+from warpjld.simulation.grip.pressed_digits import PressedDigits
 from warpjld.simulation.grip.search_budget import SearchBudget
-from warpjld.simulation.grip.shared_force import SAME_CLOSING, PressedDigits
+from warpjld.simulation.grip.shared_force import SAME_CLOSING
 from warpjld.simulation.grip.squeeze import TRAVEL
 from warpjld.simulation.grip.touch_room import touch_room
 from warpjld.simulation.report.efforts import effort_at
@@ -29,6 +31,27 @@ from warpjld.skeleton.channels import FLEXION
 __all__ = ["DigitSqueeze"]
 
 Array = NDArray[np.float64]
+
+_BACK = 2
+"""Load steps by which a digit may have been opened on the way to an equilibrium: searches end in small steps to and
+fro, and every one that began from further back would close all digits anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """An equilibrium.
+
+    Attributes:
+        grips: Closing of each digit [rad], shape (D,).
+        closed: The equilibrium.
+        furthest: Largest closing of each digit on the way to it [rad], shape (D,).
+        same: Whether digits that do not close are where they were at first.
+    """
+
+    grips: Array
+    closed: ContactSolution
+    furthest: Array
+    same: bool = True
 
 
 class DigitSqueeze:
@@ -72,7 +95,7 @@ class DigitSqueeze:
         self.digits, self.joints = tuple(joints), [list(one) for one in joints.values()]
         self._start, self._time = hand.bones.angles(after.last.time), after.last.time
         self._bounds = hand.bones.skeleton.limits[:, FLEXION]
-        self._known: list[tuple[Array, ContactSolution]] = [(np.zeros(len(self.digits)), after)]
+        self._known = [_Known(np.zeros(len(self.digits)), after, np.zeros(len(self.digits)))]
         self.solved = 0
         self.bone_room: dict[str, float] = {}
         self.touch = np.zeros(len(self.digits))
@@ -91,7 +114,7 @@ class DigitSqueeze:
             self.model, self._hand, self._time, lambda by: self.angles(np.full(count, by)), max(high)
         )
         high = [min(one, room.get(name.rpartition(".")[2], most)) for name, one in zip(self.digits, high, strict=True)]
-        after, names = self._known[0][1].last.displacement, [digit.rpartition(".")[2] for digit in self.digits]
+        after, names = self._known[0].closed.last.displacement, [digit.rpartition(".")[2] for digit in self.digits]
         touch = touch_room(
             self.model, self._hand, after, self._time, lambda by: self.angles(np.full(count, by)), max(high)
         )
@@ -115,13 +138,20 @@ class DigitSqueeze:
         effort = self.effort(grips, closed.last)
         mine = [effort[digit] for digit in self.digits]
         forces, shares = (np.array([getattr(one, name) for one in mine]) for name in ("force", "share"))
+        load = float(shares.max())
         if self.wanted is not None:
             shares = forces / self.wanted
-        return PressedDigits(forces, shares, self._slopes(grips, closed, effort) if closed.last.touches else None)
+        slopes = self._slopes(grips, closed, effort) if closed.last.touches else None
+        return PressedDigits(forces, shares, slopes, load)
 
     def effort(self, grips: Array, instant: ContactInstant) -> Effort:
         """Effort of the muscles at closings (D,)."""
         return effort_at(self.model, self._hand, self._posed(self.angles(grips)), instant, self._limits)
+
+    def solved_at(self, grips: Array) -> ContactInstant | None:
+        """The equilibrium at closings (D,); None if contact could not be solved."""
+        closed = self._closed(grips)
+        return None if closed is None else closed.last
 
     def known(self, grips: Array) -> ContactInstant | None:
         """The equilibrium at closings that were tried; None if it was not found."""
@@ -129,41 +159,65 @@ class DigitSqueeze:
         return None if found is None else found.last
 
     def note(self, grips: Array, angles: Array, closed: ContactSolution) -> None:
-        """Take over an equilibrium at closings (D,) that is known already, if its joint angles (J, 4) are the same."""
-        if closed.converged and np.abs(self.angles(grips) - angles).max() < SAME_CLOSING:
-            self._known.append((grips.copy(), closed))
+        """Take over an equilibrium that is known already, if the digits have the joint angles (J, 4) of closings (D,).
+
+        Where other digits, which press on nothing, are elsewhere, others start from it.
+        """
+        apart, mine = np.abs(self.angles(grips) - angles), [joint for one in self.joints for joint in one]
+        if closed.converged and apart[mine].max() < SAME_CLOSING:
+            self._known.append(_Known(grips.copy(), closed, grips.copy(), same=apart.max() < SAME_CLOSING))
 
     @property
     def found(self) -> tuple[tuple[Array, ContactInstant], ...]:
         """All equilibria that were found: closings (D,), and the equilibrium there."""
-        return tuple((at, closed.last) for at, closed in self._known)
+        return tuple((one.grips, one.closed.last) for one in self._known if one.same)
+
+    def spent(self) -> bool:
+        """Whether no linear solves are left."""
+        return self._budget is not None and self._budget.exhausted
 
     def _tried(self, grips: Array) -> ContactSolution | None:
-        return next((closed for at, closed in self._known if np.abs(at - grips).max() < SAME_CLOSING), None)
+        known = (one for one in self._known if one.same and np.abs(one.grips - grips).max() < SAME_CLOSING)
+        return next((one.closed for one in known), None)
 
     def _closed(self, grips: Array) -> ContactSolution | None:
-        """Equilibrium at closings, reached from the nearest known one at which no digit is bent further.
+        """Equilibrium at closings, reached from the nearest known one on whose way no digit was bent further by more
+        than two load steps.
 
         Friction remembers its way, and the keys that are found close the digits without opening them again.
         """
         if (same := self._tried(grips)) is not None:
             return same
-        if self._budget is not None and self._budget.exhausted:
+        if self.spent():
             return None
-        below = [one for one in self._known if (one[0] <= np.maximum(grips, 0.0) + SAME_CLOSING).all()]
-        at, before = max(below, key=lambda one: float(one[0].sum()))
+        begun = [one for one in self._known if self._on_the_way(one, grips)]
+        nearest = min(begun, key=lambda one: self._far(one, grips))
+        at, before = nearest.grips, nearest.closed
         near = np.maximum(at, np.minimum(grips, self.touch))
         if (near > at + SAME_CLOSING).any():
             found = self._onward(before, at, near, 1)  # nothing touches on the way
             if found.converged:
                 at, before = near, found
-        steps = self._hand.bones.steps([(self.angles(end), self._time) for end in (at, grips)], TRAVEL)
-        found = self._onward(before, at, grips, steps)
+        found = self._onward(before, at, grips, self._steps(at, grips))
         self.solved += 1
         if not found.converged:
             return None
-        self._known.append((grips.copy(), found))
+        self._known.append(_Known(grips.copy(), found, np.maximum(nearest.furthest, grips)))
         return found
+
+    def _on_the_way(self, known: _Known, grips: Array) -> bool:
+        """Whether closings are reached from known ones without opening digits by more than two load steps in all."""
+        if (known.furthest <= np.maximum(grips, 0.0) + SAME_CLOSING).all():
+            return True
+        return self._steps(np.maximum(known.furthest, grips), grips) <= _BACK
+
+    def _far(self, known: _Known, grips: Array) -> tuple[int, float]:
+        """Load steps from known closings to others, and the sum of the digits' ways [rad]."""
+        return self._steps(known.grips, grips), float(np.abs(known.grips - grips).sum())
+
+    def _steps(self, at: Array, grips: Array) -> int:
+        """Load steps between closings."""
+        return self._hand.bones.steps([(self.angles(end), self._time) for end in (at, grips)], TRAVEL)
 
     def _onward(self, before: ContactSolution, at: Array, grips: Array, steps: int) -> ContactSolution:
         """Equilibrium at closings (D,) from that at others, in a number of load steps."""
@@ -173,7 +227,7 @@ class DigitSqueeze:
 
         budget, closing = self._budget, (self._hand.name, moves)
         most = None if budget is None else max(1, budget.next)
-        found = solve_branch(self.model, self._history, before, steps, moves=closing, solves=most)
+        found = solve_branch(self.model, self._history, before, steps, moves=closing, solves=most, ease=True)
         return found if budget is None else budget.counted(found)
 
     def _slopes(self, grips: Array, closed: ContactSolution, effort: Effort) -> Array | None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.fem.contact import ContactSolution
 from warpjld.simulation.animation import AngleEdit
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.flesh_body import FleshBody
@@ -16,7 +16,7 @@ from warpjld.simulation.grip.find_shared import find_shared
 from warpjld.simulation.grip.force import ForceStatus, PressedForce, force_grip
 from warpjld.simulation.grip.found import FoundGrip, SupportRelease, digits_that_press, trial_row
 from warpjld.simulation.grip.hand_trials import HandTrials
-from warpjld.simulation.grip.opposed import firmest_opposed, worst_opposed
+from warpjld.simulation.grip.opposed import firmest_opposed, left_ratio, worst_opposed
 from warpjld.simulation.grip.search import GripStatus, Trial, gentlest_grip
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.grip.squeeze import Squeeze
@@ -33,6 +33,9 @@ _NEAR = 0.1
 """Tolerance of the smallest grip, relative to its force: a trial near the limit, where the object creeps, takes 50 to
 100 linear solves."""
 
+_CLOSING, _STEP = 450, 120
+"""Most linear solves while all digits close alike until a force is reached, and of one load step of that: 80 to 130 and
+5 to 10 as a rule, up to 30 where a step is halved."""
 _REACHED = 0.03
 """Relative tolerance of a force that was asked for, as searches find it within 2 %."""
 _TRIALS = 24
@@ -64,7 +67,7 @@ def find_grip(
     if request.share:
         return find_shared(model, history, request, after, limits, tell)
     joints = [hand.bones.skeleton.index(channel.rpartition(".")[0]) for channel in request.channels]
-    budget = SearchBudget() if request.lift else None
+    budget = SearchBudget() if request.lift else SearchBudget(_CLOSING, trial=_STEP)
     squeeze = Squeeze(model, history, hand, joints, after, limits, budget)
     squeeze.keep_bones_out(request.most)
     most = max(min(request.most, squeeze.room), 1e-6)
@@ -96,14 +99,28 @@ def _opposed(
     if before is None:
         return replace(found, edits=_edits(squeeze, request, joints, found.grip))
     balanced = None
-    if found.status == ForceStatus.REACHED.name:
+    if found.status in (ForceStatus.REACHED.name, ForceStatus.NO_SOLUTION.name):
         balanced = balanced_grip(request, squeeze, found.grip, before, joints, _START, tell)
-    if balanced is None or abs(balanced.forces.sum() / request.force - 1.0) > _REACHED:
+    least = (1.0 - _REACHED) * request.force
+    if balanced is None or balanced.forces.sum() < min(least, _bound(squeeze, before.object)):
         alike = _alike(found, request, squeeze, before, tell)
         if balanced is None or balanced.forces.sum() <= alike.force:
             return replace(alike, edits=_edits(squeeze, request, joints, alike.grip))
-        found = replace(alike, text=f"{ForceStatus.UNOPPOSED.value}; {request.force:.3g} N asked for")
+    if balanced.forces.sum() < least:
+        status = ForceStatus.UNOPPOSED
+        rows = tuple(one | {"status": status.name} for one in found.rows)
+        text = f"{status.value}; {request.force:.3g} N asked for"
+        found = replace(found, status=status.name, text=text, rows=rows)
     return replace(with_balance(found, balanced), edits=_closed_edits(squeeze.hand, request, balanced))
+
+
+def _bound(squeeze: Squeeze, name: str) -> float:
+    """Force of the gentlest known equal closing that leaves an object unbalanced: firmer ones are not balanced [N]."""
+    for grip in squeeze.known:
+        last = squeeze.closed(grip).last
+        if left_ratio(squeeze.model, last, name) > 1.0:
+            return sum(digit.force for digit in squeeze.effort(grip, last).digits)
+    return math.inf
 
 
 def _alike(
@@ -190,28 +207,23 @@ def _firm(request: GripSpecification, squeeze: Squeeze, most: float, tell: Calla
     """Search for the grip up to ``most`` [rad] whose digits press with the requested force."""
     assert request.force is not None
     counted = request.digits or tuple(dict.fromkeys(channel.split(".")[-3] for channel in request.channels))
-    instants: dict[float, ContactInstant] = {}
 
-    def press(grip: float) -> PressedForce | None:
-        closed = squeeze.closed(grip)
-        if not closed.converged:
-            return None
-        instants[grip] = closed.last
+    def pressed(grip: float, closed: ContactSolution) -> PressedForce:
         effort = squeeze.effort(grip, closed.last)
         worst = max(effort.digits, key=lambda digit: digit.share)
-        mine = [d.digit for d in effort.digits if d.digit.rpartition(".")[2] in counted]
-        slopes = squeeze.slopes(grip, closed) if closed.last.touches else None
-        slope = None if slopes is None else sum(slopes[digit].force for digit in mine)
-        force = sum(effort[digit].force for digit in mine)
+        force = sum(digit.force for digit in effort.digits if digit.digit.rpartition(".")[2] in counted)
         tell(f"{math.degrees(grip):.2f}°: {force:.3g} N of {request.force:.3g} N")
-        return PressedForce(force, worst.share, worst.digit, slope)
+        return PressedForce(force, worst.share, worst.digit)
 
-    found = force_grip(press, 0.0, most, request.force, start=min(_START, most))
+    def close(grip: float) -> Iterator[tuple[float, PressedForce]]:
+        for at, closed in squeeze.toward(grip):
+            yield at, pressed(at, closed)
+
+    found = force_grip(close, 0.0, most, request.force, exhausted=lambda: squeeze.budget.exhausted)
     text = f"{' + '.join(counted)}: {found.text}"
     if found.status is ForceStatus.REACHED:
         text += f"; they close on by {math.degrees(found.grip):.2f}°"
-    instant = instants.get(found.grip)
-    effort = squeeze.effort(found.grip, instant) if instant is not None else None
+    effort = squeeze.effort(found.grip, squeeze.closed(found.grip).last) if found.trials else None
     rows = [trial_row(request, grip, one, grip == found.grip, found.status.name) for grip, one in found.trials]
     force = found.pressed.force if found.pressed is not None else 0.0
     return FoundGrip(request, found.status.name, text, found.grip, None, force, digits_that_press(effort), tuple(rows))

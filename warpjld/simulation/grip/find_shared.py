@@ -18,7 +18,9 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.digit_squeeze import DigitSqueeze
 from warpjld.simulation.grip.force import PressedForce
 from warpjld.simulation.grip.found import FoundGrip, digits_that_press, trial_row
-from warpjld.simulation.grip.shared_force import SAME_CLOSING, PressedDigits, SharedGrip, share_force
+from warpjld.simulation.grip.pressed_digits import PressedDigits
+from warpjld.simulation.grip.search_budget import SearchBudget
+from warpjld.simulation.grip.shared_force import SAME_CLOSING, SharedGrip, share_force
 from warpjld.simulation.specification import GripSpecification, located
 from warpjld.skeleton.channels import FLEXION
 
@@ -44,7 +46,7 @@ def find_shared(
         digit = joint.rpartition(".")[0]
         if digit.rpartition(".")[2] in wanted:
             joints.setdefault(digit, []).append(hand.bones.skeleton.index(joint))
-    squeeze = DigitSqueeze(model, history, hand, joints, after, limits)
+    squeeze = DigitSqueeze(model, history, hand, joints, after, limits, SearchBudget())
     allowed = force_limits(limits)
     strengths = [allowed[digit.rpartition(".")[2]] for digit in joints]
 
@@ -56,7 +58,9 @@ def find_shared(
         return pressed
 
     low, high = squeeze.range(request.most)
-    found = share_force(press, low, high, strengths, request.force, start=_START, touch=squeeze.touch)
+    found = share_force(
+        press, low, high, strengths, request.force, start=_START, touch=squeeze.touch, exhausted=squeeze.spent
+    )
     instant = squeeze.known(found.grips)
     effort = squeeze.effort(found.grips, instant) if instant is not None and instant.touches else None
     rows = [

@@ -1,8 +1,13 @@
-"""Search for the grip with a given total force, or the reason why there is none (R118, R123)."""
+"""Search for the grip with a given total force, or the reason why there is none (R118, R123).
+
+The digits close from one load step to the next and stop at the first whose force is enough. Every step on the way is
+an equilibrium, so that no grip is tried far beyond the force that is asked for, where flesh is thin and equilibria are
+hard to find. Between the last two steps the grip is interpolated (``Bracket``).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -13,10 +18,8 @@ from warpjld.simulation.grip.bracket import Bracket, checked_step
 
 __all__ = ["ForceGrip", "ForceStatus", "PressedForce", "force_grip"]
 
-_ROUNDS = 24
-"""Most grips tried; with slopes three or four are enough."""
-_LOST = 2
-"""Grips without an equilibrium after which the search ends."""
+_ROUNDS = 12
+"""Most grips gone to, beside those on the way to the first that is enough; one or two are, as a rule."""
 
 
 class ForceStatus(Enum):
@@ -30,6 +33,7 @@ class ForceStatus(Enum):
     LIMIT = "unreachable: the digits are bent as far as they may"
     NO_CONTACT = "nothing is touched however far the digits bend"
     NO_SOLUTION = "contact could not be solved at a firmer grip"
+    EXHAUSTED = "the linear solves allowed were spent before the force was reached"
     INTERRUPTED = "the search was interrupted before the force was reached"
 
 
@@ -41,13 +45,11 @@ class PressedForce:
         force: Total force [N].
         share: Largest load share (load over limit) of the muscles.
         who: Digit with that share.
-        slope: Derivative of the force with respect to the grip; None if not known.
     """
 
     force: float
     share: float = 0.0
     who: str = ""
-    slope: float | None = None
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class ForceGrip:
 
     Attributes:
         status: How the search ended.
-        grip: Grip, the argument of ``press``.
+        grip: Grip, as ``close`` counts it.
         pressed: Its force; None if no grip was solved.
         trials: Every grip tried, in order.
         text: Summary in one line.
@@ -70,53 +72,54 @@ class ForceGrip:
 
 
 def force_grip(
-    press: Callable[[float], PressedForce | None],
+    close: Callable[[float], Iterator[tuple[float, PressedForce]]],
     low: float,
     high: float,
     force: float,
     *,
-    start: float | None = None,
     tolerance: float = 0.02,
+    exhausted: Callable[[], bool] = lambda: False,
 ) -> ForceGrip:
-    """Close until a force is reached (see ``Bracket``).
+    """Close until a force is reached.
 
     Args:
-        press: Force of a grip, increasing with the grip; None if contact could not be solved.
+        close: Grips and their forces, which increase, on the way to a grip and at it; they end before it where contact
+            could not be solved. What is not asked for is not solved.
         low: Smallest grip.
         high: Largest grip.
         force: Target force [N].
-        start: First step above ``low`` without contact; by default a sixteenth of the range.
         tolerance: Relative tolerance of the force.
+        exhausted: Whether nothing more may be solved.
 
     Raises:
         InputError: Range, force or tolerance out of range.
     """
-    step = checked_step(low, high, None if start is None else min(float(start), high - low))
     if not (np.isfinite(force) and force > 0.0 and 0.0 < tolerance < 1.0):
         raise InputError(f"grip: want a force above 0 N and a tolerance between 0 and 1, got {force}, {tolerance}")
     trials: list[tuple[float, PressedForce]] = []
-    bracket, grip, lost = Bracket(low, high, force, step), low, 0
+    bracket = Bracket(low, high, force, checked_step(low, high, None))
+    grip = low
     for _ in range(_ROUNDS):
+        at = None
         try:
-            found = press(grip)
+            for at, found in close(grip):
+                trials.append((at, found))
+                bracket.note(at, found.force, None, enough=found.force >= force)
+                status = _status(found, force, tolerance, at, low, high)
+                if status is not None:
+                    return _ended(status, force, low, trials)
+                if found.force >= force:
+                    break
+            else:
+                if at != grip:
+                    break
         except KeyboardInterrupt:
             return _ended(ForceStatus.INTERRUPTED, force, low, trials)
-        if found is None:
-            lost += 1
-            bracket.lose(grip)
-            if lost >= _LOST or not trials:
-                break
-        else:
-            trials.append((grip, found))
-            bracket.note(grip, found.force, found.slope, enough=found.force >= force)
-            status = _status(found, force, tolerance, grip, low, high)
-            if status is not None:
-                return _ended(status, force, low, trials)
-        ahead = bracket.next()
+        ahead = high if bracket.above is None else bracket.next()
         if ahead is None:
             break
         grip = ahead
-    return _ended(ForceStatus.NO_SOLUTION, force, low, trials)
+    return _ended(ForceStatus.EXHAUSTED if exhausted() else ForceStatus.NO_SOLUTION, force, low, trials)
 
 
 def _status(

@@ -8,7 +8,7 @@ that is asked for, the digits close as far as what they press with is opposed, a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from warpjld.fem.contact import ContactInstant
 from warpjld.simulation.bodies.model import ContactModel
@@ -17,7 +17,7 @@ from warpjld.simulation.report.balance import ObjectBalance, balances
 from warpjld.simulation.solve.grasp_balance import allowed_net
 from warpjld.simulation.solve.solved_frame import solved_frame
 
-__all__ = ["allowed_left", "firmest_opposed", "worst_opposed"]
+__all__ = ["allowed_left", "firmest_allowed", "firmest_opposed", "left_ratio", "worst_opposed"]
 
 _ROUNDS = 4
 """Most further grips solved."""
@@ -57,14 +57,35 @@ def firmest_opposed(squeeze: Squeeze, name: str, high: float, tell: Callable[[st
     """
 
     def ratio(grip: float) -> float:
-        """What is left over, relative to what is allowed; infinite if contact is not solved."""
         closed = squeeze.closed(grip)
-        if not closed.converged:
-            return math.inf
-        balance = worst_opposed(squeeze.model, closed.last, name)
-        return 0.0 if balance is None else balance.net / allowed_left(balance)
+        return left_ratio(squeeze.model, closed.last if closed.converged else None, name)
 
-    known = [(grip, ratio(grip)) for grip in squeeze.known if grip <= high]
+    def say(grip: float, found: float) -> None:
+        tell(f"{math.degrees(grip):.2f}°: {found:.2f} of what may be left over on {name}")
+
+    return firmest_allowed(ratio, [grip for grip in squeeze.known if grip <= high], high, say)
+
+
+def left_ratio(model: ContactModel, instant: ContactInstant | None, name: str) -> float:
+    """What is left over on a rigid object, relative to what is allowed; infinite without an equilibrium."""
+    if instant is None:
+        return math.inf
+    balance = worst_opposed(model, instant, name)
+    return 0.0 if balance is None else balance.net / allowed_left(balance)
+
+
+def firmest_allowed(
+    ratio: Callable[[float], float], grips: Sequence[float], high: float, tell: Callable[[float, float], None]
+) -> float:
+    """Largest known or found grip up to ``high`` below which what is left over is allowed; 0 if it never is.
+
+    Args:
+        ratio: What is left over at a grip, relative to what is allowed; infinite if contact is not solved there.
+        grips: Grips that are known, ascending.
+        high: A grip at which it is too much.
+        tell: Called with a grip and its ratio.
+    """
+    known = [(grip, ratio(grip)) for grip in grips]
     over = [one for one in known if one[1] > 1.0] or [(high, math.inf)]
     above = over[0]
     below = max((one for one in known if one[0] < above[0]), default=None)
@@ -73,10 +94,10 @@ def firmest_opposed(squeeze: Squeeze, name: str, high: float, tell: Callable[[st
     for _ in range(_ROUNDS):
         if below[1] >= _NEAR:
             break
-        rise = above[1] - below[1]
-        share = (_AIM - below[1]) / rise if math.isfinite(rise) else 0.5
+        root, rise = math.sqrt(below[1]), math.sqrt(above[1]) - math.sqrt(below[1])  # forces grow with the square
+        share = (math.sqrt(_AIM) - root) / rise if math.isfinite(rise) else 0.5
         grip = below[0] + min(max(share, _INSIDE), 1.0 - _INSIDE) * (above[0] - below[0])
         found = grip, ratio(grip)
-        tell(f"{math.degrees(grip):.2f}°: {found[1]:.2f} of what may be left over on {name}")
+        tell(*found)
         below, above = (found, above) if found[1] <= 1.0 else (below, found)
     return below[0]

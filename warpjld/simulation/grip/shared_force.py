@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.fem.hand.stiffening import ForceSlope, way_to
 from warpjld.simulation.grip.force import ForceStatus
+from warpjld.simulation.grip.pressed_digits import PressedDigits
 
-__all__ = ["SAME_CLOSING", "PressedDigits", "SharedGrip", "share_force"]
+__all__ = ["SAME_CLOSING", "SharedGrip", "share_force"]
 
 Array = NDArray[np.float64]
 
@@ -51,26 +52,15 @@ _STILL = 0.2
 _PAST = 8.0
 """Closing beyond where a digit should touch, over the first step, after which one that does not even graze passes by
 what it should press on: 5 mm of a fingertip with steps of half a degree, where flesh would press with several N."""
+_KEPT, _TOLD = (0.2, 2.0), 0.05
+"""Bounds of the rise of a digit's share in the last step over the rise that slopes promised, and promised rise over the
+share from which on it is told by that: a thumb that slid along a can rose by half of what was promised."""
+_SLIGHT = 0.25
+"""Force of a digit, over the mean of all, below which its unevenness counts for less: in proportion."""
 _SINGULAR = 1e4
 """Condition number above which the digits cannot press apart from one another."""
 SAME_CLOSING = 1e-9
 """Tolerance for equal closings [rad]."""
-
-
-@dataclass(frozen=True, eq=False)
-class PressedDigits:
-    """Forces of the digits at an equilibrium.
-
-    Attributes:
-        forces: Force of each digit [N], shape (D,).
-        shares: Largest load share (load over limit) of each digit's muscles, shape (D,).
-        slopes: Derivative of the share of digit i with respect to the closing of digit j [1/rad], shape (D, D); None if
-            unknown.
-    """
-
-    forces: Array
-    shares: Array
-    slopes: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +94,7 @@ def share_force(
     even: float = 0.05,
     begin: Array | None = None,
     touch: Array | None = None,
+    exhausted: Callable[[], bool] = lambda: False,
 ) -> SharedGrip:
     """Find closings from 0 on at which the digits' shares are equal and their forces sum to ``force``.
 
@@ -118,6 +109,7 @@ def share_force(
         begin: Closings of the first trial, shape (D,); 0 by default.
         touch: Closings at which the digits are expected to touch first, shape (D,): one that does not press yet goes
             there in one step; by default nothing is expected.
+        exhausted: Whether nothing more may be solved.
 
     Raises:
         InputError: Ranges that do not contain 0, a force, strength or step that is not above 0.
@@ -136,7 +128,7 @@ def share_force(
             return search.ended(ForceStatus.INTERRUPTED, tolerance)
         if found is None:
             lost += 1
-            if lost >= _LOST or not search.trials:
+            if lost >= _LOST or exhausted() or not search.trials:
                 break
             grips = 0.5 * (grips + search.trials[-1][0])
             continue
@@ -149,7 +141,9 @@ def share_force(
             break
         grips = ahead
     reached = any(search.sums_up(found, tolerance) for _, found in search.trials)
-    return search.ended(ForceStatus.UNEVEN if reached else ForceStatus.NO_SOLUTION, tolerance)
+    if reached:
+        return search.ended(ForceStatus.UNEVEN, tolerance)
+    return search.ended(ForceStatus.EXHAUSTED if exhausted() else ForceStatus.NO_SOLUTION, tolerance)
 
 
 class _Search:
@@ -189,10 +183,12 @@ class _Search:
         return abs(float(found.forces.sum()) - self.force) <= tolerance * self.force
 
     def unevenness(self, grips: Array, found: PressedDigits) -> float:
-        """Largest relative difference of the able digits' shares from their mean; infinite without such digits."""
-        shares = found.shares[self.wanted(grips, found)[1]]
-        mean = float(shares.mean()) if len(shares) else 0.0
-        return float(np.abs(shares / mean - 1.0).max()) if mean > 0.0 else np.inf
+        """Largest relative difference of the able digits' shares from their mean, which counts less for digits that
+        are to press slightly; infinite without such digits."""
+        able = self.wanted(grips, found)[1]
+        shares, counts = found.shares[able], np.minimum(self.strengths / (_SLIGHT * self.strengths.mean()), 1.0)[able]
+        mean = float(shares @ counts / counts.sum()) if len(shares) else 0.0
+        return float((counts * np.abs(shares / mean - 1.0)).max()) if mean > 0.0 else np.inf
 
     def status(self, tolerance: float, even: float) -> ForceStatus | None:
         """Status with which the last trial ends the search; None to continue."""
@@ -203,7 +199,7 @@ class _Search:
         if self.sums_up(found, tolerance):
             uneven = self.unevenness(grips, found)
             if uneven <= even:
-                return ForceStatus.REACHED if found.shares.max() <= 1.0 else ForceStatus.TOO_WEAK
+                return ForceStatus.REACHED if found.strain <= 1.0 else ForceStatus.TOO_WEAK
             self._idle = 0 if uneven < _NEARER * self._best else self._idle + 1
             self._best = min(self._best, uneven)
             if self._idle >= _IDLE:
@@ -212,7 +208,7 @@ class _Search:
             if total > self.force:
                 return ForceStatus.HARDER_ALREADY
             return ForceStatus.LIMIT if total > 0.0 else ForceStatus.NO_CONTACT
-        if found.shares[able].min() > 1.0 and total < self.force:
+        if min(found.shares[able].min(), found.strain) > 1.0 and total < self.force:
             return ForceStatus.TOO_WEAK
         return None
 
@@ -266,7 +262,7 @@ class _Search:
         ways = np.array([self._way(d, slopes[k, k], share) for k, d in enumerate(digits)])
         missing = np.diagonal(slopes) * ways
         if found.slopes is not None:
-            missing -= found.slopes[digits] @ others
+            missing -= (self._kept()[:, None] * found.slopes)[digits] @ others
         if np.linalg.cond(slopes / np.diagonal(slopes)) < _SINGULAR:
             step = np.linalg.solve(slopes, missing)
         else:
@@ -286,7 +282,7 @@ class _Search:
         for there, known in self.trials[-2::-1]:
             if known.slopes is not None and abs(there[d] - grips[d]) > SAME_CLOSING and self.pressing(known)[d]:
                 if known.slopes[d, d] > 0.0 and found.slopes is not None:
-                    other = ForceSlope(float(known.shares[d]), float(known.slopes[d, d]))
+                    other = ForceSlope(float(known.shares[d]), float(self._kept()[d] * known.slopes[d, d]))
                 break
         return way_to(share, now, other, _POWER)
 
@@ -295,7 +291,7 @@ class _Search:
         touched one step ago."""
         grips, found = self.trials[-1]
         if found.slopes is not None:
-            out = found.slopes[np.ix_(digits, digits)].copy()
+            out = (self._kept()[:, None] * found.slopes)[np.ix_(digits, digits)]
             if np.isfinite(out).all() and (np.diagonal(out) > 0.0).all():
                 return np.asarray(out)
         out = np.diag(_POWER * found.shares[digits] / self.start)
@@ -307,6 +303,20 @@ class _Search:
                     break
         return np.asarray(out)
 
+    def _kept(self) -> Array:
+        """Rise of each digit's share in the last step, over that promised by the slopes at both ends of it, (D,); 1 for
+        those that did not press before, or of which little was promised."""
+        out = np.ones(len(self.low))
+        if len(self.trials) < 2:
+            return out
+        (there, before), (here, now) = self.trials[-2:]
+        if before.slopes is None or now.slopes is None:
+            return out
+        promised = 0.5 * (before.slopes + now.slopes) @ (here - there)
+        told = self.pressing(before) & self.pressing(now) & (np.abs(promised) > _TOLD * now.shares)
+        out[told] = np.clip((now.shares - before.shares)[told] / promised[told], *_KEPT)
+        return out
+
     def ended(self, status: ForceStatus, tolerance: float) -> SharedGrip:
         """Result with the trial that came nearest: of those with the wanted sum, the most even one."""
         trials = tuple(self.trials)
@@ -315,7 +325,7 @@ class _Search:
         if status in (ForceStatus.REACHED, ForceStatus.LIMIT, ForceStatus.HARDER_ALREADY):
             best = trials[-1]
         else:
-            able = [one for one in trials if one[1].shares.max() <= 1.0] or [trials[0]]
+            able = [one for one in trials if one[1].strain <= 1.0] or [trials[0]]
             summed = [one for one in able if self.sums_up(one[1], tolerance)]
             if summed:
                 best = min(summed, key=lambda one: self.unevenness(*one))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem.contact import ContactInstant, ContactSolution
-from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent, SensitivityError
+from warpjld.fem.contact.sensitivity.equilibrium_tangent import EquilibriumTangent
 from warpjld.fem.contact.sensitivity.perturbation import Perturbation
 from warpjld.fem.hand.blend import Moves
 from warpjld.fem.hand.muscles import Effort
@@ -18,7 +18,6 @@ from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.grip.bone_room import bone_room
 from warpjld.simulation.grip.search_budget import SearchBudget
 from warpjld.simulation.report.efforts import effort_at
-from warpjld.simulation.sensitivity.effort_slope import DigitSlope, EffortTangent
 from warpjld.simulation.sensitivity.parameters import angles_perturbed
 from warpjld.simulation.solve.branch import solve_branch
 from warpjld.skeleton.channels import FLEXION
@@ -97,10 +96,27 @@ class Squeeze:
 
         steps, closing = self.steps(before, grip, TRAVEL), self.closes(before, grip)
         most = self.budget.trial(_EACH * steps)
-        found = solve_branch(self.model, self.history, self._closed[before], steps, moves=closing, solves=most)
+        found = solve_branch(
+            self.model, self.history, self._closed[before], steps, moves=closing, solves=most, ease=True
+        )
         self.budget.counted(found)
         (self._closed if found.converged else self._failed)[grip] = found
         return found
+
+    def toward(self, grip: float) -> Iterator[tuple[float, ContactSolution]]:
+        """Grips and equilibria, one for every load step, from the largest known one below a grip to that grip [rad];
+        they end before it where none is found."""
+        at = max(known for known in self._closed if known <= grip + _SAME)
+        if grip - at <= _SAME:
+            yield grip, self._closed[at]
+            return
+        steps = self.steps(at, grip, TRAVEL)
+        for ahead in (at + (grip - at) * (k + 1) / steps for k in range(steps - 1)):
+            if self.budget.exhausted or not self.closed(ahead).converged:
+                return
+            yield ahead, self._closed[ahead]
+        if not self.budget.exhausted and self.closed(grip).converged:
+            yield grip, self._closed[grip]
 
     def closes(self, before: float, grip: float) -> tuple[str, Callable[[float], Moves]]:
         """Bone motion of a branch on which the hand closes from one grip to another."""
@@ -130,19 +146,6 @@ class Squeeze:
         out = np.zeros_like(self._start)
         out[self._joints, FLEXION] = self._start[self._joints, FLEXION] + grip < self._high
         return out
-
-    def slopes(self, grip: float, closed: ContactSolution) -> dict[str, DigitSlope] | None:
-        """Derivatives of the digits' efforts with respect to the grip [per rad]; None if not known."""
-        bones, along, angles = self.hand.bones, self.along(grip), self.angles(grip)
-        try:
-            tangent, change = self.tangent(grip, closed)
-            contact, limits = tangent.contact.sum(axis=0), self.limits
-            poses = bones.posed(angles, self.time)
-            efforts = EffortTangent(self.model, self.hand, closed.last, contact, poses, limits)
-            response = tangent.response(change)
-            return efforts.slopes(response, change, lambda by: bones.posed(angles + by * along, self.time))
-        except SensitivityError:
-            return None
 
     def stays(self, grip: float) -> tuple[str, Callable[[float], Moves]]:
         """Bone motion of a branch on which the hand stays at a grip."""

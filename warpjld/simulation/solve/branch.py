@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.fem import Loads, Prescribed
-from warpjld.fem.contact import ContactSolution, press
+from warpjld.fem.contact import ContactInstant, ContactSolution, press
 from warpjld.fem.hand.blend import Moves
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
+from warpjld.simulation.solve.eased import EASED_SOLVES, ROUGH, UNEASED_SOLVES, around_free_objects, solve_eased
 
 __all__ = ["solve_branch", "solve_onward"]
 
@@ -39,6 +40,7 @@ def solve_onward(
     halvings: int | None = None,
     solves: int | None = None,
     tolerance: float = _TOLERANCE,
+    ease: bool = False,
 ) -> ContactSolution:
     """Solve equilibria at ascending times from a previous solution, or from rest.
 
@@ -53,25 +55,62 @@ def solve_onward(
         halvings: Most halvings of a load step; by default as many as ``press`` allows.
         solves: Most linear solves; by default as many as ``press`` allows.
         tolerance: Convergence tolerance, residual over the forces in balance.
+        ease: Whether free objects give way through a medium where no equilibrium is found otherwise (``solve_eased``).
 
     Returns:
         The solution; its status says whether the last time was reached.
     """
-    return press(
-        model.body,
-        lambda time: model.prescribed(time, history),
-        model.pairs,
-        loads or (lambda time: model.loads_at(time, history)),
-        times=times,
-        after=after,
-        method=method,
-        aitken=aitken,
-        tolerance=tolerance,
-        guess=lambda before, time, displacement: model.guess(before, time, displacement, history),
-        halvings=halvings,
-        solves=solves,
-        check=False,
-    )
+    asked = loads or (lambda time: model.loads_at(time, history))
+
+    def pressed(
+        before: ContactSolution | None,
+        times: Sequence[float],
+        loads: Callable[[float], Loads],
+        halvings: int | None,
+        solves: int | None,
+        tolerance: float = tolerance,
+    ) -> ContactSolution:
+        return press(
+            model.body,
+            lambda time: model.prescribed(time, history),
+            model.pairs,
+            loads,
+            times=times,
+            after=before,
+            method=method,
+            aitken=aitken,
+            tolerance=tolerance,
+            guess=lambda before, time, displacement: model.guess(before, time, displacement, history),
+            halvings=halvings,
+            solves=solves,
+            check=False,
+        )
+
+    since = 0.0 if after is None else after.last.time
+    around = around_free_objects(model, since, times[-1]) if ease else None
+    if around is None:
+        return pressed(after, times, asked, halvings, solves)
+
+    def step(
+        before: ContactSolution | None, time: float, loads: Callable[[float], Loads], exact: bool
+    ) -> ContactSolution:
+        return pressed(before, [time], loads, 0, EASED_SOLVES, tolerance if exact else ROUGH)
+
+    here, instants, spent = after, list[ContactInstant](), 0
+    for time in times:
+        left = None if solves is None else max(0, solves - spent)
+        found = pressed(here, [time], asked, halvings, UNEASED_SOLVES if left is None else min(UNEASED_SOLVES, left))
+        spent += found.spent
+        if not found.converged and (left is None or found.spent < left):
+            eased = solve_eased(step, asked, here, time, around)
+            spent += eased.spent
+            found = eased if eased.converged else found
+        instants += found.instants
+        if not found.converged:
+            return replace(found, instants=(*instants,), spent=spent)
+        here = found
+    assert here is not None
+    return replace(here, instants=(*instants,), spent=spent)
 
 
 def solve_branch(
@@ -88,6 +127,7 @@ def solve_branch(
     halvings: int | None = None,
     solves: int | None = None,
     tolerance: float = _TOLERANCE,
+    ease: bool = False,
 ) -> ContactSolution:
     """Solve equilibria along a trial branch; its functions take the branch parameter, 0 … 1.
 
@@ -103,7 +143,7 @@ def solve_branch(
         duration: Duration of the branch [frames]; None: the animation stands still.
         halvings: Most halvings of a load step; a small number gives up early where there may be no equilibrium.
         solves: Most linear solves.
-        tolerance: Convergence tolerance, as in ``solve_onward``.
+        tolerance, ease: As in ``solve_onward``.
     """
     begin = after.last.time
     length = steps * _MOMENT if duration is None else duration
@@ -133,5 +173,13 @@ def solve_branch(
     aside = replace(model, hands=tuple(hands.values()), objects=tuple(objects.values()))
     times = [begin + length * (k + 1) / steps for k in range(steps)]
     return solve_onward(
-        aside, history, after, times, loads=loads, halvings=halvings, solves=solves, tolerance=tolerance
+        aside,
+        history,
+        after,
+        times,
+        loads=loads,
+        halvings=halvings,
+        solves=solves,
+        tolerance=tolerance,
+        ease=ease,
     )

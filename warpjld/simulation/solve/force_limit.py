@@ -214,7 +214,8 @@ class ForceLimits:
             raise BoneInsideError(inside)
         for tried in count():  # terminates: after _TRIES, digits above their limits stop at ``now`` and no longer close
             closing = self._closing(model, now, time)
-            found = solve_onward(self.driven(model), history, before, [time], halvings=_HALVINGS if closing else None)
+            halvings = _HALVINGS if closing else None
+            found = solve_onward(self.driven(model), history, before, [time], halvings=halvings, ease=True)
             if not found.converged:
                 if not closing:
                     return found

@@ -14,7 +14,6 @@ from warpjld.skeleton.recognise.placing.expected import body_expectations
 from warpjld.skeleton.recognise.placing.expected_digits import finger_expectations
 from warpjld.skeleton.recognise.placing.finding import Finding, millimetres, one_per_joint
 from warpjld.skeleton.recognise.placing.inside import held_inside, open_ends
-from warpjld.skeleton.recognise.placing.knuckle_width import widest_at_knuckles
 from warpjld.skeleton.recognise.placing.sections import check_in_flesh, check_sections, check_segments
 from warpjld.skeleton.recognise.placing.symmetry import without_shared
 from warpjld.skeleton.recognise.placing.trunk import body_frame, check_crown, check_spine
@@ -109,7 +108,7 @@ def _check_expected(
     # a misplaced tip would make the joints before it look misplaced
     tips = {name: joints[name] + one.offset for name, one in flesh.items() if one.ahead and one.deviation > 1.0}
     aside = {name: one.deviation for name, one in flesh.items() if one.ahead is None}
-    found = finger_expectations(joints | tips, widest_at_knuckles(skeleton, vertices, faces), aside)
+    found = finger_expectations(joints | tips, aside)
     up, _ = body_frame(joints)
     if up is not None:
         high = vertices[np.unique(faces)] @ up
