@@ -53,6 +53,25 @@ def test_all_87_are_joints_where_they_were_placed(files, rig):
     assert list(actor_skeleton(rig.skeleton, rig.surface.vertices, rig.surface.faces).points) == list(points)
 
 
+def test_points_in_a_surface_that_is_inside_out_are_inside(files, figure, tmp_path):
+    """Each of the 87 was said to lie outside."""
+    trimesh.Trimesh(figure.surface.vertices, figure.surface.faces[:, ::-1], process=False).export(tmp_path / "out.obj")
+    rig = load_rig(tmp_path / "out.obj", points=files[1])
+    assert rig.suspicious == ()
+    assert "the surface is inside out: its triangles are turned over" in rig.notes
+
+
+def test_points_of_other_axes_are_told_in_one_line(files, tmp_path):
+    def lying(points):
+        for name, (x, y, z) in points.items():
+            points[name] = [x, -z, y]
+
+    found = load_rig(files[0], points=changed(files, tmp_path, lying)).suspicious
+    (line,) = [line for line in found if "outside" in line and "points lie" in line]
+    assert "of 87 points lie outside the surface (" in line
+    assert "unit and axes of its file" in line
+
+
 def test_points_near_one_another_are_not_merged(files, tmp_path):
     """Vertebrae 2 mm apart, a carpal end at the wrist, a fingertip outside: they stay where they are."""
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpjld.errors import InputError
-from warpjld.grasp import Places
+from warpjld.grasp import Places, make_object
 from warpjld.grasp.shapes import box
 from warpjld.motion import Key, Track
 from warpjld.script import Interpreter, Scene
@@ -106,6 +106,21 @@ def test_a_rotation_pulls_away_from_its_axis() -> None:
     assert load is not None
     body = RigidBody(rigid_shape("bar", box(*SIDES), contact.physical["bar"]), Places.of((0.0, 0.0, 0.0)))
     assert load.at(body, 0.0) == pytest.approx([-MASS * 16.0 * 0.3, 0, 0, 0, 0, 0], abs=1e-12)
+
+
+def test_points_on_a_surface_of_few_triangles_are_found() -> None:
+    """A pressure on a patch of a box of 12 triangles: none of them lies in the patch."""
+    import trimesh
+
+    mesh = trimesh.creation.box(SIDES)
+    thing = make_object("bar", np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int32))
+    contact = loaded("pressure", Points("near", centre=(0.0, 0.005, 0.0), radius=0.012), pressure=1000.0)
+    load = rigid_load(contact, "bar", thing)
+    assert load is not None
+    body = RigidBody(rigid_shape("bar", thing, contact.physical["bar"]), Places.of((0.0, 0.0, 0.0)))
+    force = load.at(body, 0.0)
+    assert -1000.0 * np.pi * 0.012**2 < force[1] < -1000.0 * 0.3 * np.pi * 0.012**2
+    assert force[[0, 2]] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_points_without_a_face_are_named() -> None:

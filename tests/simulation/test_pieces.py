@@ -130,3 +130,11 @@ def test_pieces_that_do_not_deform_say_what_to_do() -> None:
     text = "OBJECT bar BOX 0.02 0.06 0.02\nOBJECT b BOX 0.02 0.02 0.02 AT 1 0 0\nPHYSICAL b\nPIECES bar 2\nPRESS 0 1\n"
     with pytest.raises(InputError, match="BAR_1 does not deform here: PHYSICAL BAR_1 makes it so"):
         run_contact(scene_of(text), Path())
+
+
+def test_a_region_without_a_name_is_called_by_its_number(bar: Path) -> None:
+    text = f"OBJECT bar '{bar}'\nPHYSICAL bar OF RUBBER\nPHYSICAL bar REGION 2 YOUNG 4000\n"
+    ((name, matter),) = scene_of(text).contact.physical["BAR"].regions
+    assert (name, matter.young) == ("region2", 4000.0)
+    with pytest.raises(InputError, match="BAR has no region region7; did you mean region2"):
+        scene_of(text.replace("REGION 2", "REGION 7"))

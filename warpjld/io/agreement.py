@@ -7,21 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpjld.geometry.inside_out import is_inside_out
 from warpjld.io.source import SourceRig
 
 __all__ = ["elsewhere", "outside_out"]
 
-_INSIDE_OUT = -0.1  # largest volume of a surface that is inside out, per sum of its parts' sizes: a flat one's is 0
 _SIZES = 10.0  # largest ratio of the sizes of skeleton and surface; a hand's with the whole arm's joints is 4
 
 
 def outside_out(source: SourceRig) -> SourceRig:
     """The rig with its triangles turned over, and a note, if their volume is negative: they are wound clockwise."""
-    if not len(source.faces):
-        return source
-    corners = source.vertices[source.faces] - source.vertices[source.faces.ravel()].mean(axis=0)
-    parts = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-    if not float(parts.sum()) < _INSIDE_OUT * float(np.abs(parts).sum()):
+    if not is_inside_out(source.vertices, source.faces):
         return source
     return replace(
         source,

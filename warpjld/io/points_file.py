@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from warpjld.errors import InputError
 from warpjld.files.text_file import read_json
 from warpjld.files.whole_file import whole_file
+from warpjld.geometry.inside_out import is_inside_out
 from warpjld.io.mesh_file import MeshFile
 from warpjld.io.source import SourceRig
 from warpjld.skeleton.actor_points import ACTOR_PARENTS, ACTOR_POINTS, CANONICAL, point_set
@@ -37,6 +38,7 @@ from warpjld.suggest import did_you_mean
 
 __all__ = ["read_points_file", "write_points_file"]
 
+_LISTED = 4  # most points outside the surface that are told one by one
 _SAME = 1e-6  # distance up to which points coincide, per size of the surface
 
 
@@ -58,8 +60,15 @@ def read_points_file(path: str | Path, mesh: MeshFile) -> SourceRig:
     frames = np.tile(np.eye(4), (len(names), 1, 1))
     frames[:, :3, 3] = list(points.values())
     parents = [number.get(ACTOR_PARENTS[name] or "", -1) for name in names]
-    outside = [names[j] for j in np.flatnonzero(outside_surface(mesh.vertices, mesh.faces, frames[:, :3, 3]))]
+    faces = mesh.faces[:, ::-1] if is_inside_out(mesh.vertices, mesh.faces) else mesh.faces
+    outside = [names[j] for j in np.flatnonzero(outside_surface(mesh.vertices, faces, frames[:, :3, 3]))]
     doubts = [f"{path.name}: {name} lies outside the surface" for name in outside]
+    if len(outside) > _LISTED:
+        shown = f"{', '.join(outside[:_LISTED])} and {len(outside) - _LISTED} more"
+        doubts = [
+            f"{path.name}: {len(outside)} of {len(names)} points lie outside the surface ({shown}): "
+            "want positions in the unit and axes of its file"
+        ]
     return SourceRig(
         path=mesh.path,
         tree=SourceTree(names, np.array(parents), frames),

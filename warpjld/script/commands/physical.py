@@ -45,7 +45,7 @@ def physical(scene: Scene, arguments: Arguments) -> None:
     where = arguments.last
     if prop.deforms:
         raise arguments.error(f"{prop.name} is deformed by key frames or by formula: it cannot be physical as well")
-    region = arguments.name("a region's name") if arguments.keyword("REGION") else None
+    region = _region(arguments) if arguments.keyword("REGION") else None
     options = arguments.options(
         of=lambda: arguments.choice("a material", [name.upper() for name in MATERIALS]).lower(),
         law=lambda: arguments.choice("the law", _LAWS).lower(),
@@ -83,6 +83,13 @@ def physical(scene: Scene, arguments: Arguments) -> None:
     elif known is not None:
         material = replace(material, regions=known.regions)
     scene.contact.physical[prop.name] = material
+
+
+def _region(arguments: Arguments) -> str:
+    """Read the name of a region; a number stands for the region of the file that has no other name."""
+    if arguments.has_number():
+        return f"region{arguments.integer('the number of a region', minimum=0)}"
+    return arguments.name("a region's name")
 
 
 def _with_region(

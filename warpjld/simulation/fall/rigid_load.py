@@ -16,6 +16,9 @@ from warpjld.simulation.specification import ContactSpecification
 
 __all__ = ["RigidLoad", "rigid_load"]
 
+_ACROSS = 20.0
+"""Edges across an object's largest extent, by which the points of loads are found."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Part:
@@ -81,24 +84,33 @@ def rigid_load(contact: ContactSpecification, name: str, thing: GraspObject) -> 
     Raises:
         InputError: A point set selects no point, or no complete face of the surface.
     """
+    spin, loads = contact.spins.get(name), {key: load for key, load in contact.loads.items() if key[0] == name}
     parts = []
-    world = thing.place.apply(thing.vertices)[0]
-    for (one, points, _), load in contact.loads.items():
-        if one != name:
-            continue
+    vertices, faces = _fine_surface(thing) if loads else (thing.vertices, thing.faces)
+    world = thing.place.apply(vertices)[0]
+    for (_, points, _), load in loads.items():
         try:
-            chosen = load.points.choose(thing.vertices, world)
-            parts.append(_part(load, thing, chosen))
+            parts.append(_part(load, vertices, faces, load.points.choose(vertices, world)))
         except InputError as error:
             raise InputError(f"{name}: points {points}: {error.message}") from None
-    spin = contact.spins.get(name)
     return RigidLoad(tuple(parts), spin) if parts or spin is not None else None
 
 
-def _part(load: ObjectLoad, thing: GraspObject, chosen: NDArray[np.int64]) -> _Part:
+def _fine_surface(thing: GraspObject) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+    """A surface with edges short enough to find points on, as elements would have: files may have few vertices."""
+    import trimesh
+
+    longest = float(thing.size.max()) / _ACROSS
+    vertices, faces = trimesh.remesh.subdivide_to_size(thing.vertices, thing.faces, longest, max_iter=20)
+    return np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+
+
+def _part(
+    load: ObjectLoad, vertices: NDArray[np.float64], faces: NDArray[np.integer], chosen: NDArray[np.int64]
+) -> _Part:
     if load.kind == "force":
-        return _Part(load, thing.vertices[chosen].mean(axis=0), 0.0, np.zeros(3), np.zeros(3))
-    corners = thing.vertices[thing.faces[np.isin(thing.faces, chosen).all(axis=1)]]
+        return _Part(load, vertices[chosen].mean(axis=0), 0.0, np.zeros(3), np.zeros(3))
+    corners = vertices[faces[np.isin(faces, chosen).all(axis=1)]]
     if not len(corners):
         raise InputError("no face of the surface lies between them: take more of the object")
     normal = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.errors import InputError
+from warpjld.geometry.inside_out import is_inside_out
 from warpjld.skeleton.place.body import place_body
 from warpjld.skeleton.place.hand import place_hand
 from warpjld.skeleton.place.solid import VoxelSolid, solid_of
@@ -50,6 +51,8 @@ def propose_points(
     vertices, faces = np.asarray(vertices, dtype=np.float64)[used], number[faces]
     if not len(faces) or not np.ptp(vertices, axis=0).max() > 0.0:
         raise InputError(f"{label}: has no triangles, or no extent")
+    if is_inside_out(vertices, faces):
+        faces = faces[:, ::-1]
     if side is not None:
         return _hand(vertices, faces, side, label)
     try:
