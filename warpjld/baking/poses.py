@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from warpjld.covering.pose_sets import curled
 from warpjld.geometry.rotations import about
+from warpjld.skeleton.channels import ABDUCTION, CHANNELS, FLEXION
 from warpjld.skeleton.hand import DIGITS
 from warpjld.skeleton.kinematics import Poses, poses_beside_rest, poses_from_rotations
-from warpjld.skeleton.tree import CHANNELS, Skeleton
+from warpjld.skeleton.tree import Skeleton
 
 __all__ = ["NamedPoses", "poses_in_a_row", "training_poses", "unseen_poses"]
 
-_FLEXION, _PIVOT, _TWISTING, _ABDUCTION = range(len(CHANNELS))
 _WIDE = np.radians(150.0)  # largest angle in training, whatever the limits allow
 _UNKNOWN = np.radians(30.0)  # largest angle of channels with wide, symmetric limits, of which nothing is known
 _TURN = np.radians(20.0)  # rotation of single joints about the world's axes, since motion files do not respect limits
@@ -72,10 +72,10 @@ def training_poses(skeleton: Skeleton, *, seed: int = 0, random: int = _RANDOM) 
     moves = generator.uniform(0.0, 1.0, many.shape) < np.where(np.arange(random)[:, None, None] % 2, 0.4, 1.0)
     bent: NDArray[np.float64] = 0.5 * (common + own)
     side = generator.uniform(-1.0, 1.0, many.shape)
-    many[..., _FLEXION] = np.where(
+    many[..., FLEXION] = np.where(
         generator.uniform(0.0, 1.0, many.shape[:2]) < 0.85,
-        bent[..., _FLEXION] * high[:, _FLEXION],
-        own[..., _FLEXION] * low[:, _FLEXION],
+        bent[..., FLEXION] * high[:, FLEXION],
+        own[..., FLEXION] * low[:, FLEXION],
     )
     many[..., 1:] = (np.where(side > 0.0, side * high, -side * low) * _ASIDE)[..., 1:]
     many *= moves
@@ -103,23 +103,23 @@ def unseen_poses(skeleton: Skeleton) -> NamedPoses:
         for j in fingers:
             digit = skeleton.names[j].split(".")[-2]
             lean = {"index": 1.0, "middle": 0.3, "ring": -0.5, "pinky": -1.0}.get(digit, 0.0)
-            spread[:, j, _ABDUCTION] = np.radians([9.0, 17.0]) * lean
+            spread[:, j, ABDUCTION] = np.radians([9.0, 17.0]) * lean
         add("spread", poses_beside_rest(skeleton, spread))
     single: tuple[tuple[str, str, tuple[tuple[int, float], ...]], ...] = (
-        ("thumb", "thumb.base", ((_FLEXION, 12.0), (_ABDUCTION, -25.0))),
-        ("thumb", "thumb.base", ((_ABDUCTION, 25.0),)),
-        ("thumb", "thumb.knuckle2", ((_FLEXION, 35.0),)),
-        ("thumb", "thumb.knuckle3", ((_FLEXION, 50.0),)),
-        ("wrist", "wrist", ((_FLEXION, 60.0),)),
-        ("wrist", "wrist", ((_FLEXION, -60.0),)),
-        ("wrist", "wrist", ((_ABDUCTION, 15.0),)),
-        ("elbow", "elbow", ((_FLEXION, 50.0),)),
-        ("elbow", "elbow", ((_FLEXION, 120.0),)),
-        ("knee", "knee", ((_FLEXION, 50.0),)),
-        ("knee", "knee", ((_FLEXION, 110.0),)),
-        ("shoulder", "shoulder", ((_FLEXION, 90.0),)),
-        ("shoulder", "shoulder", ((_ABDUCTION, 90.0),)),
-        ("hip", "hip", ((_FLEXION, 90.0),)),
+        ("thumb", "thumb.base", ((FLEXION, 12.0), (ABDUCTION, -25.0))),
+        ("thumb", "thumb.base", ((ABDUCTION, 25.0),)),
+        ("thumb", "thumb.knuckle2", ((FLEXION, 35.0),)),
+        ("thumb", "thumb.knuckle3", ((FLEXION, 50.0),)),
+        ("wrist", "wrist", ((FLEXION, 60.0),)),
+        ("wrist", "wrist", ((FLEXION, -60.0),)),
+        ("wrist", "wrist", ((ABDUCTION, 15.0),)),
+        ("elbow", "elbow", ((FLEXION, 50.0),)),
+        ("elbow", "elbow", ((FLEXION, 120.0),)),
+        ("knee", "knee", ((FLEXION, 50.0),)),
+        ("knee", "knee", ((FLEXION, 110.0),)),
+        ("shoulder", "shoulder", ((FLEXION, 90.0),)),
+        ("shoulder", "shoulder", ((ABDUCTION, 90.0),)),
+        ("hip", "hip", ((FLEXION, 90.0),)),
     )
     for name, end, channels in single:
         joints = [j for j in _inner(skeleton) if f".{skeleton.names[j]}".endswith(f".{end}")]
