@@ -26,6 +26,7 @@ from warpjld.covering.heat import DiffusionFactor
 from warpjld.covering.laplacian import conducting_laplacian, uniform_laplacian
 from warpjld.geometry.spatial_order import spatial_order
 from warpjld.runtime.lazily import lazy_module
+from warpjld.runtime.threads import cores
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -46,7 +47,8 @@ knee, elbow): .3 leaves roughness at knuckles and shoulders, beyond .5 hips are 
 _STEPS = 2  # implicit steps of diffusion: a single one leaves a cusp at every source
 _FAR = 8.0  # decay lengths beyond which a field is not computed: less is left of it than thinning removes
 _NOTHING = 1e-10  # values below which entries are dropped: far less than thinning removes
-_BLOCK = 16_000_000  # values solved for at once, which bounds memory
+_BLOCK = 2_000_000  # values solved for at once: less memory is used again, more is asked of the system anew each time
+_LANES = 8  # fields that a thread solves together
 _SHARED = 1.6  # joints share a factorisation that has up to this many times the vertices of the largest one alone
 _ALL = 3_000  # vertices up to which all joints share one factorisation
 
@@ -95,10 +97,11 @@ class Diffusion:
         present = np.flatnonzero(np.diff(columns.indptr))
         members, spread = [], []
         for cluster, where, factor in self._clusters(columns, present, owner):
-            together = max(_BLOCK // len(where), 1)
+            order = np.argsort(where)
+            together = _LANES * max(_BLOCK // (_LANES * len(where)), cores())
             for first in range(0, len(cluster), together):
                 members.append(cluster[first : first + together])
-                spread.append(self._spread(columns[:, members[-1]], where, factor))
+                spread.append(self._spread(columns[:, members[-1]], where, order, factor))
         rigid = np.ones(coefficients.shape[0])
         rigid[self.flesh] = 0.0
         kept = sp.csr_array(sp.diags_array(rigid) @ coefficients)
@@ -112,8 +115,10 @@ class Diffusion:
         out = sp.csc_array((ordered.data, ordered.indices, starts), shape=coefficients.shape).tocsr()
         return out + kept if rigid.any() else out
 
-    def _spread(self, columns: sp.csc_array, where: NDArray[np.int64], factor: DiffusionFactor) -> sp.csc_array:
-        """Some columns after diffusion over the vertices ``where`` of the flesh."""
+    def _spread(
+        self, columns: sp.csc_array, where: NDArray[np.int64], order: NDArray[np.int64], factor: DiffusionFactor
+    ) -> sp.csc_array:
+        """Some columns after diffusion over the vertices ``where`` of the flesh, which ``order`` sorts."""
         place = np.full(columns.shape[0], -1)
         place[self.flesh[where]] = np.arange(len(where))
         row, column = place[columns.indices], np.repeat(np.arange(columns.shape[1]), np.diff(columns.indptr))
@@ -121,7 +126,6 @@ class Diffusion:
         dense = np.zeros((len(where), columns.shape[1]))
         dense[row[inside], column[inside]] = columns.data[inside]
         dense = factor.solve(dense, weight=self._system[1][where], times=_STEPS)
-        order = np.argsort(where)
         found = np.ascontiguousarray(dense[order].T)
         left = np.abs(found) > _NOTHING
         starts = np.concatenate([[0], np.cumsum(left.sum(axis=1))])
