@@ -22,14 +22,15 @@ from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 
-__all__ = ["EASED_SOLVES", "ROUGH", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
+__all__ = ["AGAIN_SOLVES", "EASED_SOLVES", "ROUGH", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
 
 Array = NDArray[np.float64]
 Step = Callable[[ContactSolution | None, float, Callable[[float], Loads], bool], ContactSolution]
 """One load step: solution to start from, time, loads, and whether it is exact and not only passed through."""
 
-EASED_SOLVES, UNEASED_SOLVES = 20, 16
-"""Most linear solves of a step through the medium, and of one without it before the object is let give way."""
+EASED_SOLVES, UNEASED_SOLVES, AGAIN_SOLVES = 20, 30, 100
+"""Most linear solves of a step through the medium, of one without it before the object is let give way, and of one
+where it did not come to rest: a load step that is cut where bodies first touch, or halved, takes up to 30."""
 
 ROUGH = 1e-2
 """Residual of a step through the medium, over the forces in balance: it is only passed through."""
