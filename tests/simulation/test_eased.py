@@ -12,6 +12,8 @@ import pytest
 
 from warpjld.fem import Loads, SolveStatus
 from warpjld.fem.contact import ContactInstant, ContactSolution
+from warpjld.simulation.bodies.deformable_body import History
+from warpjld.simulation.solve import branch
 from warpjld.simulation.solve.eased import around_free_objects, solve_eased
 
 SPRING = 500.0
@@ -101,7 +103,7 @@ def test_what_drifts_on_is_not_found() -> None:
     assert found.spent <= 220
 
 
-def test_what_one_digit_pushes_away_is_let_go_once_it_is_hardly_touched() -> None:
+def test_what_one_digit_pushes_away_rests_once_it_is_hardly_touched() -> None:
     """Its drift becomes slower and slower, and all that presses is what the medium resists with."""
     taken = []
 
@@ -113,13 +115,13 @@ def test_what_one_digit_pushes_away_is_let_go_once_it_is_hardly_touched() -> Non
         at, around = float(before.last.displacement[0, 0]), loads(time).drag
         resists = 0.0 if around is None else float(around[0]) / (time - before.last.time)
         to = (SPRING * 1e-3 + resists * at) / (SPRING + resists)
-        found = solution(time, to, solves=11)  # so that the medium does not become thinner
+        found = solution(time, to)
         touch: Any = SimpleNamespace(nodal=np.array([[SPRING * (1e-3 - to), 0.0, 0.0]]))
         return replace(found, instants=(replace(found.last, touches=(touch,)),))
 
     found = solve_eased(step, lambda time: Loads(), solution(2.0, 0.0), 3.0, AROUND)
     assert found.converged
-    assert len(taken) <= 22
+    assert len(taken) <= 15
 
 
 def test_steps_that_all_fail_end_it() -> None:
@@ -152,3 +154,32 @@ def test_only_what_nothing_holds_gives_way() -> None:
     np.testing.assert_allclose(around, [0.0, 0.5, 0.5, 0.0, 0.0, 0.0])
     model.objects = model.objects[1:]
     assert around_free_objects(model, 0.0, 1.0) is None
+
+
+@pytest.mark.parametrize(("held", "found"), [(0, True), (3, False)])
+def test_load_steps_of_free_objects_alone_are_eased(held: int, found: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A load step fails without a medium, but for an object that something holds there is none."""
+    pull, bounds = spring(5e-3, 4e-3, []), list[int]()
+
+    def press(*known: Any, times: list[float], after: Any, solves: int | None, **_: Any) -> ContactSolution:
+        bounds.append(solves or 0)
+        return pull(after, times[0], known[3], True)
+
+    monkeypatch.setattr(branch, "press", press)
+    degrees = SimpleNamespace(degrees=np.arange(held))
+    one = SimpleNamespace(name="BALL", prescribed=lambda *_: degrees, rides=lambda time: False)
+    model: Any = SimpleNamespace(
+        body=SimpleNamespace(mesh=SimpleNamespace(nodes=np.zeros((1, 3)))),
+        pairs=[],
+        objects=[one],
+        spans={"BALL": slice(0, 1)},
+        loads_at=lambda time, history: Loads(),
+    )
+    solved = branch.solve_onward(model, History(), solution(2.0, 0.0), [3.0], solves=400, ease=True)
+    assert solved.converged == found
+    assert max(bounds) <= 400
+    if found:
+        assert solved.last.displacement[0, 0] == pytest.approx(5e-3, rel=1e-9)
+        assert solved.spent > 20
+    else:
+        assert bounds == [400]

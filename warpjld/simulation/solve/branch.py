@@ -17,7 +17,14 @@ from warpjld.fem.contact import ContactInstant, ContactSolution, press
 from warpjld.fem.hand.blend import Moves
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
-from warpjld.simulation.solve.eased import EASED_SOLVES, ROUGH, UNEASED_SOLVES, around_free_objects, solve_eased
+from warpjld.simulation.solve.eased import (
+    AGAIN_SOLVES,
+    EASED_SOLVES,
+    ROUGH,
+    UNEASED_SOLVES,
+    around_free_objects,
+    solve_eased,
+)
 
 __all__ = ["solve_branch", "solve_onward"]
 
@@ -97,14 +104,19 @@ def solve_onward(
         return pressed(before, [time], loads, 0, EASED_SOLVES, tolerance if exact else ROUGH)
 
     here, instants, spent = after, list[ContactInstant](), 0
+
+    def left(most: int) -> int:
+        return most if solves is None else max(0, min(most, solves - spent))
+
     for time in times:
-        left = None if solves is None else max(0, solves - spent)
-        found = pressed(here, [time], asked, halvings, UNEASED_SOLVES if left is None else min(UNEASED_SOLVES, left))
+        found = pressed(here, [time], asked, halvings, left(UNEASED_SOLVES))
         spent += found.spent
-        if not found.converged and (left is None or found.spent < left):
-            eased = solve_eased(step, asked, here, time, around)
-            spent += eased.spent
-            found = eased if eased.converged else found
+        if not found.converged and left(1):
+            found = solve_eased(step, asked, here, time, around)
+            spent += found.spent
+        if not found.converged:
+            found = pressed(here, [time], asked, halvings, left(AGAIN_SOLVES))
+            spent += found.spent
         instants += found.instants
         if not found.converged:
             return replace(found, instants=(*instants,), spent=spent)

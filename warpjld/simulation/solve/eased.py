@@ -22,14 +22,15 @@ from warpjld.fem.contact import ContactInstant, ContactSolution
 from warpjld.simulation.bodies.deformable_body import History
 from warpjld.simulation.bodies.model import ContactModel
 
-__all__ = ["EASED_SOLVES", "ROUGH", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
+__all__ = ["AGAIN_SOLVES", "EASED_SOLVES", "ROUGH", "UNEASED_SOLVES", "around_free_objects", "solve_eased"]
 
 Array = NDArray[np.float64]
 Step = Callable[[ContactSolution | None, float, Callable[[float], Loads], bool], ContactSolution]
 """One load step: solution to start from, time, loads, and whether it is exact and not only passed through."""
 
-EASED_SOLVES, UNEASED_SOLVES = 20, 16
-"""Most linear solves of a step through the medium, and of one without it before the object is let give way."""
+EASED_SOLVES, UNEASED_SOLVES, AGAIN_SOLVES = 20, 30, 100
+"""Most linear solves of a step through the medium, of one without it before the object is let give way, and of one
+where it did not come to rest: a load step that is cut where bodies first touch, or halved, takes up to 30."""
 
 ROUGH = 1e-2
 """Residual of a step through the medium, over the forces in balance: it is only passed through."""
@@ -44,12 +45,11 @@ _MOMENT = 5e-4
 """Part of the load step that passes in a step in which the hand stays."""
 _MOVES, _STEPS, _FAILURES, _MOST = 4, 60, 4, 200
 """Steps while the hand moves, most while it stays, most that fail one after another, and most linear solves."""
-_RESTS, _NOTHING = 2e-2, 1e-4
-"""Force of the medium over what presses at which it is left out, and that which counts as none, as equilibria are found
-to no less: what rolls on two digits is held by nothing else."""
-_SLIGHT = 1e-3
-"""Sum of contact forces below which an object is hardly touched, and is let go at once [N]: what one digit pushes away
-drifts on for long."""
+_RESTS = 2e-2
+"""Force of the medium over what presses from which on an equilibrium without the medium is looked for, once."""
+_NOTHING, _UNFELT = 1e-4, 1e-4
+"""Force of the medium over what presses that counts as none, as equilibria are found to no less, and one that is too
+small to count [N]: what rolls on two digits, or is touched by one, is held by nothing else."""
 
 
 def around_free_objects(model: ContactModel, since: float, time: float) -> Array | None:
@@ -101,17 +101,18 @@ def solve_eased(
         # the correction of a step in which hardly anything moves says nothing of those to come
         here = replace(found, correction_rate=None)
         instants += found.instants
-        pushes = _pushes(found)
-        rests = left <= _NOTHING * pushes if exact else left <= _RESTS * pushes or pushes <= _SLIGHT
-        if ahead > stays - 0.5 * moment and rests:
-            thin = drag if exact else 0.0
-            found = step(here, time, _dragged(loads, (time - ahead) * thin * around) if thin else loads, True)
-            spent += found.spent
-            if found.converged and thin * _way(here, found, around) <= _NOTHING * _pushes(found):
-                return replace(found, instants=(*instants, *found.instants), spent=spent)
-            if exact:
-                break
-            exact = True
+        if ahead > stays - 0.5 * moment:
+            last, nothing = None, max(_NOTHING * _pushes(found), _UNFELT)
+            if left <= nothing:
+                last = step(here, time, _dragged(loads, (time - ahead) * drag * around), True)
+                thin = drag
+            elif not exact and left <= _RESTS * _pushes(found):
+                last, thin = step(here, time, loads, True), 0.0
+            if last is not None:
+                spent += last.spent
+                if last.converged and thin * _way(here, last, around) <= nothing:
+                    return replace(last, instants=(*instants, *last.instants), spent=spent)
+                exact = True
         if softer:
             drag *= _SOFTER
     assert found is not None
