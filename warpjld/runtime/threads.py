@@ -10,8 +10,6 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
 __all__ = ["cores", "helpers", "in_threads", "one_blas_thread", "threads_for"]
 
 
@@ -39,6 +37,8 @@ def in_threads(span: Callable[[int, int], None], count: int, threads: int, kerne
 
     if not count:
         return
+    import numpy as np  # not above: who only asks for the number of cores need not have it
+
     cuts = np.linspace(0, count, max(1, min(threads, count)) + 1).astype(int).tolist()
     if len(cuts) > 2:
         wp.load_module(kernel.module, device=device)  # compilation is not thread-safe
