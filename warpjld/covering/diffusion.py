@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import DiffusionFactor
+from warpjld.covering.heat import DiffusionFactor, columns_together
 from warpjld.covering.laplacian import conducting_laplacian, uniform_laplacian
 from warpjld.geometry.spatial_order import spatial_order
 from warpjld.runtime.lazily import lazy_module
-from warpjld.runtime.threads import cores
+from warpjld.runtime.threads import each_in_threads, one_blas_thread
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -47,8 +47,6 @@ knee, elbow): .3 leaves roughness at knuckles and shoulders, beyond .5 hips are 
 _STEPS = 2  # implicit steps of diffusion: a single one leaves a cusp at every source
 _FAR = 8.0  # decay lengths beyond which a field is not computed: less is left of it than thinning removes
 _NOTHING = 1e-10  # values below which entries are dropped: far less than thinning removes
-_BLOCK = 2_000_000  # values solved for at once: less memory is used again, more is asked of the system anew each time
-_LANES = 8  # fields that a thread solves together
 _SHARED = 1.6  # joints share a factorisation that has up to this many times the vertices of the largest one alone
 _ALL = 3_000  # vertices up to which all joints share one factorisation
 
@@ -98,7 +96,7 @@ class Diffusion:
         members, spread = [], []
         for cluster, where, factor in self._clusters(columns, present, owner):
             order = np.argsort(where)
-            together = _LANES * max(_BLOCK // (_LANES * len(where)), cores())
+            together = columns_together(max(len(where), 1))
             for first in range(0, len(cluster), together):
                 members.append(cluster[first : first + together])
                 spread.append(self._spread(columns[:, members[-1]], where, order, factor))
@@ -194,8 +192,8 @@ class Diffusion:
             else:
                 members, mask, largest = groups[best]
                 groups[best] = (members + own.tolist(), mask | reached, max(largest, size))
-        out = []
-        for members, mask, _ in groups:
-            where = order[mask[order]]
-            out.append((np.sort(np.array(members)), where, DiffusionFactor(matrix[where][:, where])))
-        return out
+        regions = [order[mask[order]] for _, mask, _ in groups]
+        with one_blas_thread():  # around all, since it holds for the whole process
+            factors = each_in_threads(lambda where: DiffusionFactor(matrix[where][:, where]), regions)
+        columns_of = [np.sort(np.array(members)) for members, _, _ in groups]
+        return list(zip(columns_of, regions, factors, strict=True))
