@@ -97,3 +97,21 @@ def test_fields_do_not_depend_on_how_many_regions_are_factorised_at_once(monkeyp
         found.append(flesh.spread(fields, owner))
         assert all(len(regions) > 1 for regions in flesh._cache.values())
     assert (found[0] != found[1]).nnz == 0
+
+
+def test_what_is_no_flesh_keeps_its_fields() -> None:
+    """Columns that only rigid vertices have, or no vertex, as well; rows are sorted, so that sums have one order."""
+    covering = wj.bind(wj.build_hand("left", resolution=1_500))
+    fields = operator_fields(covering.anchors, covering.parameters).stacked()
+    owner = joint_of_column(covering.anchors, len(covering.skeleton))
+    rigid = sp.random_array((7, fields.shape[1] + 3), density=0.1, format="csr", rng=np.random.default_rng(0))
+    rigid = sp.csr_array(rigid @ sp.diags_array(np.r_[np.ones(fields.shape[1] + 2), 0.0]))
+    wider = sp.hstack([fields, sp.csr_array((fields.shape[0], 3))])
+    together = sp.csr_array(sp.vstack([wider, rigid]))
+    found = covering.diffusion.spread(together, np.r_[owner, 0, 0, 0])
+    assert found.shape == together.shape
+    assert (found[-7:] != rigid).nnz == 0
+    assert rigid[:, fields.shape[1] :].nnz > 0
+    assert (found[:-7, :-3] != covering.diffusion.spread(fields, owner)).nnz == 0
+    assert found[:-7, -3:].nnz == 0
+    assert sp.csr_array((found.data, found.indices, found.indptr), shape=found.shape).has_sorted_indices
