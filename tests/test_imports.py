@@ -32,6 +32,31 @@ def test_import_loads_nothing_heavy(modules: str) -> None:
     assert not set(HEAVY) & set(done.stdout.split())
 
 
+_STARTED = """
+import sys
+import warpjld.cli.deform as deform
+loaded = {"numpy", "warp", "scipy"} & set(sys.modules)
+assert not loaded, loaded
+import warpjld.cli.read_ahead as read_ahead
+class Ahead:
+    def __init__(self, *request):
+        print(sorted({"numpy", "warp", "scipy"} & set(sys.modules)), request[1])
+        sys.exit()
+read_ahead.Ahead = Ahead
+read_ahead.cores = lambda: 2
+deform.deform_command(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("out", [("-o", "body.pc2"), ("--motion-out", "body.bvh", "--motion-out", "body.usda")])
+def test_reading_ahead_starts_before_numpy(tmp_path: Path, out: tuple[str, ...]) -> None:
+    for name in ("rig.glb", "walk.bvh"):
+        (tmp_path / name).touch()
+    command = [sys.executable, "-c", _STARTED, "rig.glb", "walk.bvh", *out]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "[] rig.glb\n", done.stderr
+
+
 _DEFORM = """
 import sys
 from warpjld.cli import main

@@ -26,6 +26,9 @@ TOGETHER = 8
         for (int j = 0; j < count; ++j) x[j] *= before.data[j];
         for (int j = 0; j < count; ++j) {{
             const Right here = x[j];
+            bool reached = false;
+            for (int k = 0; k < {TOGETHER}; ++k) reached |= here[k] != 0.0;
+            if (!reached) continue;  // fields of one joint begin in a small part of the surface
             for (int p = starts[j] + 1; p < starts[j + 1]; ++p) x[row.data[p]] -= lower.data[p] * here;
         }}
         for (int j = count - 1; j >= 0; --j) {{

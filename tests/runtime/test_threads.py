@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from warpjld.runtime.threads import cores, in_threads, one_blas_thread, threads_for
+from warpjld.runtime.threads import cores, each_in_threads, in_threads, one_blas_thread, threads_for
 
 
 @pytest.mark.parametrize("threads", [-1, 1, 2, 3, 16])
@@ -33,6 +33,23 @@ def test_an_error_in_any_thread_is_raised() -> None:
 
     with pytest.raises(RuntimeError, match="last piece"):
         in_threads(span, 10, 3, overlapping_boxes, "cpu")
+
+
+@pytest.mark.parametrize("count", [0, 2, 6])
+def test_each_item_has_its_result_and_two_run_at_once(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpjld.runtime.threads.cores", lambda: 2)
+    two = threading.Barrier(2)
+
+    def square(item: int) -> int:
+        two.wait(10.0)  # fails where no other item is being worked on
+        return item * item
+
+    assert each_in_threads(square, range(count)) == [item * item for item in range(count)]
+
+
+def test_an_error_of_any_item_is_raised() -> None:
+    with pytest.raises(ZeroDivisionError):
+        each_in_threads(lambda item: 1 / item, [3, 2, 1, 0])
 
 
 def test_little_work_is_not_split() -> None:

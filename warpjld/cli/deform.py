@@ -130,7 +130,6 @@ def deform_command(rig: str, clips: tuple[Path, ...], motions: tuple[Path, ...],
 
 
 def _single(wanted: Wanted, job: ClipJob) -> None:
-    from warpjld.batch.deform_file import deform_file
     from warpjld.cli.deform_wanted import checked_parameters, opened_rig
     from warpjld.cli.progress import progress
     from warpjld.cli.read_ahead import ReadAhead
@@ -138,13 +137,15 @@ def _single(wanted: Wanted, job: ClipJob) -> None:
     from warpjld.motion.out import check_motion_out
 
     began = time.perf_counter()
-    if wanted.out is not None:  # check suffix and libraries before the rig is read
-        check_cache(wanted.out)
-    for path in wanted.motions_out:
-        check_motion_out(path)
     reading = {**wanted.reading, "animation": job.animation}
-    ahead = ReadAhead(wanted.rig, wanted.how, job.motion, reading)
+    ahead = ReadAhead(wanted.rig, wanted.how, job.motion, reading)  # before NumPy is imported
     try:
+        if wanted.out is not None:  # suffix and libraries, before anything is waited for
+            check_cache(wanted.out)
+        for path in wanted.motions_out:
+            check_motion_out(path)
+        from warpjld.batch.deform_file import deform_file
+
         rig = opened_rig(wanted, ahead.rig)
         with progress(wanted.quiet) as report:
             made = deform_file(

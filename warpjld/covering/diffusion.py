@@ -17,16 +17,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpjld.covering.heat import DiffusionFactor
+from warpjld.covering.heat import DiffusionFactor, columns_together
 from warpjld.covering.laplacian import conducting_laplacian, uniform_laplacian
 from warpjld.geometry.spatial_order import spatial_order
 from warpjld.runtime.lazily import lazy_module
-from warpjld.runtime.threads import cores
+from warpjld.runtime.threads import each_in_threads, one_blas_thread
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -47,8 +48,6 @@ knee, elbow): .3 leaves roughness at knuckles and shoulders, beyond .5 hips are 
 _STEPS = 2  # implicit steps of diffusion: a single one leaves a cusp at every source
 _FAR = 8.0  # decay lengths beyond which a field is not computed: less is left of it than thinning removes
 _NOTHING = 1e-10  # values below which entries are dropped: far less than thinning removes
-_BLOCK = 2_000_000  # values solved for at once: less memory is used again, more is asked of the system anew each time
-_LANES = 8  # fields that a thread solves together
 _SHARED = 1.6  # joints share a factorisation that has up to this many times the vertices of the largest one alone
 _ALL = 3_000  # vertices up to which all joints share one factorisation
 
@@ -95,25 +94,23 @@ class Diffusion:
         """
         columns = coefficients.tocsc()
         present = np.flatnonzero(np.diff(columns.indptr))
-        members, spread = [], []
+        pieces: dict[int, list[tuple[NDArray, NDArray]]] = {column: [] for column in present.tolist()}
         for cluster, where, factor in self._clusters(columns, present, owner):
             order = np.argsort(where)
-            together = _LANES * max(_BLOCK // (_LANES * len(where)), cores())
+            together = columns_together(max(len(where), 1))
             for first in range(0, len(cluster), together):
-                members.append(cluster[first : first + together])
-                spread.append(self._spread(columns[:, members[-1]], where, order, factor))
-        rigid = np.ones(coefficients.shape[0])
-        rigid[self.flesh] = 0.0
-        kept = sp.csr_array(sp.diags_array(rigid) @ coefficients)
-        if not spread:
-            return kept
-        column = np.concatenate(members)
-        ordered = sp.csc_array(sp.hstack(spread, format="csc"))[:, np.argsort(column)]
-        length = np.zeros(coefficients.shape[1], dtype=np.int64)
-        length[np.sort(column)] = np.diff(ordered.indptr)
-        starts = np.concatenate([[0], np.cumsum(length)])
-        out = sp.csc_array((ordered.data, ordered.indices, starts), shape=coefficients.shape).tocsr()
-        return out + kept if rigid.any() else out
+                members = cluster[first : first + together]
+                for column, piece in zip(
+                    members.tolist(), _by_column(self._spread(columns[:, members], where, order, factor)), strict=True
+                ):
+                    pieces[column].append(piece)
+        rigid = np.ones(coefficients.shape[0], dtype=bool)
+        rigid[self.flesh] = False
+        if rigid.any():
+            for column, (row, value) in enumerate(_by_column(columns)):
+                if (kept := rigid[row] & (value != 0.0)).any():
+                    pieces[column].append((row[kept], value[kept]))
+        return _of_pieces(pieces, coefficients.shape)
 
     def _spread(
         self, columns: sp.csc_array, where: NDArray[np.int64], order: NDArray[np.int64], factor: DiffusionFactor
@@ -194,8 +191,26 @@ class Diffusion:
             else:
                 members, mask, largest = groups[best]
                 groups[best] = (members + own.tolist(), mask | reached, max(largest, size))
-        out = []
-        for members, mask, _ in groups:
-            where = order[mask[order]]
-            out.append((np.sort(np.array(members)), where, DiffusionFactor(matrix[where][:, where])))
-        return out
+        regions = [order[mask[order]] for _, mask, _ in groups]
+        with one_blas_thread():  # around all, since it holds for the whole process
+            factors = each_in_threads(lambda where: DiffusionFactor(matrix[where][:, where]), regions)
+        columns_of = [np.sort(np.array(members)) for members, _, _ in groups]
+        return list(zip(columns_of, regions, factors, strict=True))
+
+
+def _by_column(matrix: sp.csc_array) -> list[tuple[NDArray, NDArray[np.float64]]]:
+    """Rows and values of every column, as views."""
+    cuts = matrix.indptr.tolist()
+    return [(matrix.indices[begin:end], matrix.data[begin:end]) for begin, end in pairwise(cuts)]
+
+
+def _of_pieces(pieces: dict[int, list[tuple[NDArray, NDArray]]], shape: tuple[int, int]) -> sp.csr_array:
+    """Matrix of columns' rows and values, each place once; copied once, since there may be tens of millions."""
+    length = np.zeros(shape[1] + 1, dtype=np.int64)
+    for column, parts in pieces.items():
+        length[column + 1] = sum(len(row) for row, _ in parts)
+    ordered = [piece for _, parts in sorted(pieces.items()) for piece in parts]
+    if not ordered:
+        return sp.csr_array(shape)
+    row, value = (np.concatenate([piece[k] for piece in ordered]) for k in (0, 1))
+    return sp.csc_array((value, row, np.cumsum(length)), shape=shape).tocsr()

@@ -66,9 +66,8 @@ def domains_from_geometry(
     size = max(size, 1e-3)
     # far from every segment the diffusion length is bounded by the size of the surface
     demand = contrast / np.clip(distance, 1e-4 * size, size) ** 2
-    source = np.zeros((len(vertices), len(groups)))
-    source[np.arange(len(vertices)), owner] = 1.0
-    present = np.flatnonzero(source.any(axis=0))
+    present, column = np.unique(owner, return_inverse=True)
+    rows, shape = np.arange(len(vertices)), (len(vertices), len(present))
     laplacian, area = cotangent_laplacian(points, faces, np.minimum(distance, size))
     order = spatial_order(points)
     for conducting, cover in (
@@ -76,10 +75,17 @@ def domains_from_geometry(
         (lambda: uniform_laplacian(faces, len(vertices)), np.full(len(vertices), area.mean())),
     ):
         heat = cover * demand
-        weights = np.zeros_like(source)
-        found = solve_diffusion(conducting() + sp.diags_array(heat), heat[:, None] * source[:, present], order)
-        if found is not None and (total := np.maximum(found, 0.0).sum(axis=1)).min() > 0.5:
-            weights[:, present] = np.maximum(found, 0.0) / total[:, None]
+        source = sp.coo_array((heat, (rows, column)), shape=shape)
+        found = solve_diffusion(conducting() + sp.diags_array(heat), source, order)
+        if found is None:
+            continue
+        np.maximum(found, 0.0, out=found)  # in place: of a large body it is a fifth of a gigabyte
+        if (total := found.sum(axis=1)).min() > 0.5:
+            found /= total[:, None]
+            if len(present) == len(groups):
+                return found
+            weights = np.zeros((len(vertices), len(groups)))
+            weights[:, present] = found
             return weights
     raise InputError(
         "domains: heat diffusion has no solution on this surface; try --domains skin if the rig has painted weights, "

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
-import numpy as np
+__all__ = ["cores", "each_in_threads", "helpers", "in_threads", "one_blas_thread", "threads_for"]
 
-__all__ = ["cores", "helpers", "in_threads", "one_blas_thread", "threads_for"]
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 
 def cores() -> int:
@@ -39,6 +40,8 @@ def in_threads(span: Callable[[int, int], None], count: int, threads: int, kerne
 
     if not count:
         return
+    import numpy as np  # not above: who only asks for the number of cores need not have it
+
     cuts = np.linspace(0, count, max(1, min(threads, count)) + 1).astype(int).tolist()
     if len(cuts) > 2:
         wp.load_module(kernel.module, device=device)  # compilation is not thread-safe
@@ -46,6 +49,19 @@ def in_threads(span: Callable[[int, int], None], count: int, threads: int, kerne
     span(cuts[0], cuts[1])
     for other in others:
         other.result()
+
+
+def each_in_threads(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    """``function(item)`` of every item, in their order, at once on all cores.
+
+    For long functions that release the interpreter lock, as SuperLU's factorisation does. What the first of them to
+    fail raises is raised.
+    """
+    threads = min(cores(), len(items))
+    if threads < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(threads, thread_name_prefix="warpjld") as pool:
+        return list(pool.map(function, items))
 
 
 @cache

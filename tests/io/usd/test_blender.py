@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.io import load_rig
 from warpjld.motion import load_motion
-from warpjld.motion.out import source_motion, write_motion
+from warpjld.motion.out import write_motion
+from warpjld.motion.out.source_motion import source_motion
 
 pytest.importorskip("pxr")
 

@@ -13,7 +13,8 @@ import pytest
 from warpjld.hand import build_hand
 from warpjld.io import load_rig
 from warpjld.motion import load_motion
-from warpjld.motion.out import source_motion, write_motion
+from warpjld.motion.out import write_motion
+from warpjld.motion.out.source_motion import source_motion
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 TOLERANCE = 1e-4  # [m], asked for

@@ -18,7 +18,8 @@ from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.io.skeleton_file import write_skeleton_file
 from warpjld.motion import load_motion
-from warpjld.motion.out import source_motion, write_motion
+from warpjld.motion.out import write_motion
+from warpjld.motion.out.source_motion import source_motion
 from warpjld.rig import Rig, Skin
 from warpjld.skeleton import Poses, poses_from_rotations, poses_from_world
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from warpjld.errors import InputError
 from warpjld.io import load_rig
 from warpjld.motion.joint_animation import JointAnimation
-from warpjld.motion.out import source_motion
+from warpjld.motion.out.source_motion import source_motion
 from warpjld.motion.own_joints import own_poses
 from warpjld.rig import Rig
 from warpjld.skeleton import poses_from_world, rest_poses

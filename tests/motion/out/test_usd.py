@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 from warpjld.errors import InputError, MissingExtraError
 from warpjld.io import load_rig
 from warpjld.motion import load_motion
-from warpjld.motion.out import source_motion, write_motion
+from warpjld.motion.out import write_motion
 from warpjld.motion.out.skin_weights import joint_weights
+from warpjld.motion.out.source_motion import source_motion
 from warpjld.rig import Rig
 from warpjld.skeleton import Poses, poses_from_rotations
 

@@ -8,10 +8,16 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from warpjld.errors import InputError
-from warpjld.geometry.surface import Surface
-from warpjld.io.caches.cache import Cache, CacheTiming
+from warpjld.runtime.lazily import lazy_names
+
+if TYPE_CHECKING:
+    from warpjld.geometry.surface import Surface
+    from warpjld.io.caches.cache import Cache
+else:
+    __getattr__ = lazy_names(__name__, {"Cache": "cache"})
 
 __all__ = ["FORMATS", "Cache", "check_cache", "open_cache"]
 
@@ -83,6 +89,8 @@ def open_cache(
         >>> cache.files[0].name
         'hand.npz'
     """
+    from warpjld.io.caches.cache import CacheTiming
+
     path = Path(path)
     cache: Cache = _kind(path)(path, surface, CacheTiming(frames=frames, rate=rate, start=start_frame, name=name))
     return cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from warpjld.motion.out.source_motion import SourceMotion, source_motion
 from warpjld.motion.out.write import MOTION_OUT, Timing, WrittenMotion, check_motion_out, write_motion
 
-__all__ = ["MOTION_OUT", "SourceMotion", "Timing", "WrittenMotion", "check_motion_out", "source_motion", "write_motion"]
+__all__ = ["MOTION_OUT", "Timing", "WrittenMotion", "check_motion_out", "write_motion"]

@@ -6,13 +6,15 @@ import math
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from warpjld.errors import InputError
 from warpjld.files.folders import make_folder
 from warpjld.files.whole_file import whole_file
-from warpjld.rig import Rig
-from warpjld.skeleton import Poses
+
+if TYPE_CHECKING:
+    from warpjld.rig import Rig
+    from warpjld.skeleton import Poses
 
 __all__ = ["MOTION_OUT", "MotionWriter", "Timing", "WrittenMotion", "check_motion_out", "write_motion"]
 
