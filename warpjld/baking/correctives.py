@@ -2,15 +2,16 @@
 
 The error of blend skinning at frame f is mapped back to the bind pose by the inverse of each vertex's blended matrix,
 since engines add shapes before they skin. Every bone's rotation relative to its parent, a quaternion x, y, z, w with
-w ≥ 0, gives nine features: x, y, z, x², y², z², xy, xz, yz. Ridge regressions predict the errors from them, one for
-the skin of each bone, from the features of only those bones that deform it (``predicted_errors``). The K directions of
-largest variance of the prediction are the shapes (reduced-rank regression: Izenman 1975): no K other shapes with
-weights that are linear in the features leave less of it, so that joints get shapes by what these take off.
+w ≥ 0, gives 19 features: the products of one to three of x, y, z (``PRODUCTS``). Ridge regressions predict the errors
+from them, one for the skin of each bone, from the features of only those bones that deform it (``predicted_errors``).
+The K directions of largest variance of the prediction are the shapes (reduced-rank regression: Izenman 1975): no K
+other shapes, driven by these features, come nearer to the prediction, so that joints get shapes by what these take off.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,14 @@ from scipy.sparse import csc_array
 
 from warpjld.baking.predicted import Prediction, predicted_errors
 
-__all__ = ["Correctives", "features", "fit_correctives", "no_correctives"]
+__all__ = ["PRODUCTS", "Correctives", "features", "fit_correctives", "no_correctives"]
 
 _DAMPING = 1e-2  # damping of inverses of nearly singular blended matrices (candy-wrapper artefacts)
 _SMALLEST_DRIVE = (
     1e-4  # share of a joint's energy in a shape's weight, of the strongest joint's, below which it is none
 )
-_PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+PRODUCTS = tuple(chosen for degree in (1, 2, 3) for chosen in combinations_with_replacement(range(3), degree))
+"""Which of x, y, z of a quaternion each feature multiplies."""
 _FRAMES = 16  # frames mapped back at once, which bounds memory
 _COLUMNS = 30_000  # coordinates whose products are added up at once, likewise
 
@@ -35,7 +37,7 @@ class Correctives:
 
     Attributes:
         shapes: Displacements in the bind pose [m], shape (K, V, 3).
-        drivers: Coefficient of every feature of every bone in a shape's weight, shape (K, B, 9).
+        drivers: Coefficient of every feature of every bone in a shape's weight, shape (K, B, 19).
         span: Smallest and largest weight over the poses fitted to, zero included, shape (K, 2).
     """
 
@@ -53,13 +55,12 @@ class Correctives:
 
 def no_correctives(vertices: int, bones: int) -> Correctives:
     """An empty set of shapes."""
-    return Correctives(np.zeros((0, vertices, 3)), np.zeros((0, bones, 9)))
+    return Correctives(np.zeros((0, vertices, 3)), np.zeros((0, bones, len(PRODUCTS))))
 
 
 def features(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Features x, y, z, x², y², z², xy, xz, yz of quaternions (F, B, 4), shape (F, B, 9)."""
-    vector = turns[..., :3]
-    return np.concatenate([vector, np.stack([vector[..., a] * vector[..., b] for a, b in _PRODUCTS], -1)], -1)
+    """Features of quaternions (F, B, 4), shape (F, B, 19)."""
+    return np.stack([turns[..., list(chosen)].prod(axis=-1) for chosen in PRODUCTS], axis=-1)
 
 
 def fit_correctives(
@@ -109,7 +110,7 @@ def _strongest(rows: NDArray[np.float32], count: int) -> NDArray[np.float64]:
 
 
 def _drivers(found: Prediction, inputs: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coefficients (K, B, 9) of the features (F, B, 9) in the weights of orthonormal shapes (K, 3 V); those of bones
+    """Coefficients (K, B, 19) of the features (F, B, 19) in the weights of orthonormal shapes (K, 3 V); those of bones
     that hardly drive a shape are zero."""
     bones = inputs.shape[1]
     drivers = np.zeros((len(shapes), bones, inputs.shape[2]))

@@ -33,7 +33,7 @@ class Part:
     Attributes:
         vertices: Its vertices, shape (n,).
         drivers: The bones that deform it, shape (m,).
-        coefficients: Displacements per unit of each feature [m], times the skin weights, shape (9 m, 3 n).
+        coefficients: Displacements per unit of each feature [m], times the skin weights, shape (N m, 3 n).
     """
 
     vertices: NDArray[np.int64]
@@ -59,7 +59,7 @@ def predicted_errors(errors: NDArray[np.float32], inputs: NDArray[np.float64], s
 
     Args:
         errors: Displacements in the bind pose [m], shape (F, V, 3).
-        inputs: Nine features of every bone's rotation, shape (F, B, 9).
+        inputs: Features of every bone's rotation, the first three x, y, z, shape (F, B, N).
         skin: Weight of every bone at every vertex, shape (V, B).
     """
     frames = len(errors)
