@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-__all__ = ["Part", "Prediction", "deforming_bones", "predicted_errors"]
+__all__ = ["PredictedSkin", "Prediction", "deforming_bones", "predicted_errors"]
 
 _RIDGES = 10.0 ** np.arange(-6.0, 1.1, 0.5)  # strengths tried, relative to the features' mean square
 _DEFORMS = (
@@ -27,7 +27,7 @@ _STILL = 1e-6  # |x, y, z| of a rotation below which a bone does not turn
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class PredictedSkin:
     """The prediction for the skin of one bone.
 
     Attributes:
@@ -51,7 +51,7 @@ class Prediction:
     """
 
     errors: NDArray[np.float32]
-    parts: tuple[Part, ...]
+    parts: tuple[PredictedSkin, ...]
 
 
 def predicted_errors(errors: NDArray[np.float32], inputs: NDArray[np.float64], skin: csc_array) -> Prediction:
@@ -76,7 +76,7 @@ def predicted_errors(errors: NDArray[np.float32], inputs: NDArray[np.float64], s
         rows = errors[:, vertices].reshape(frames, -1)
         coefficients = _ridge(known, rows, np.repeat(share, 3)).astype(np.float32)
         out[:, vertices] += (known.astype(np.float32) @ coefficients).reshape(frames, -1, 3)
-        parts.append(Part(vertices, drivers, coefficients))
+        parts.append(PredictedSkin(vertices, drivers, coefficients))
     return Prediction(out, tuple(parts))
 
 
