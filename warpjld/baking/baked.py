@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
 
 from warpjld.baking.bones import Bones, bones_of
 from warpjld.baking.correctives import Correctives, fit_correctives, no_correctives
@@ -133,7 +134,11 @@ def bake(
         matrices = plain.blended(poses[part])
         linear[part] = matrices[..., :3]
         errors[part] = targets[part] - np.einsum("fvij,vj->fvi", matrices[..., :3], rest) - matrices[..., 3]
-    found = fit_correctives(errors, linear, bones.turns(poses), correctives)
+    skin = coo_array(
+        (weights.ravel(), (np.repeat(np.arange(len(rest)), influences), joints.ravel())), shape=(len(rest), len(bones))
+    ).tocsc()
+    skin.eliminate_zeros()
+    found = fit_correctives(errors, linear, bones.turns(poses), skin, correctives)
     if progress:
         progress("corrective shapes", 1, 1)
     return Baked(rig, bones, joints, weights, found)

@@ -2,25 +2,33 @@
 
 The error of blend skinning at frame f is mapped back to the bind pose by the inverse of each vertex's blended matrix,
 since engines add shapes before they skin. Every bone's rotation relative to its parent, a quaternion x, y, z, w with
-w ≥ 0, gives nine features: x, y, z, x², y², z², xy, xz, yz. A ridge regression predicts the errors from them; its
-strength is the one with the least leave-one-out error. The K directions of largest variance of the prediction are the
-shapes (reduced-rank regression: Izenman 1975), so that they contain what joint rotations predict, not the errors of
-single poses.
+w ≥ 0, gives 19 features: the products of one to three of x, y, z (``PRODUCTS``). Ridge regressions predict the errors
+from them, one for the skin of each bone, from the features of only those bones that deform it (``predicted_errors``).
+The K directions of largest variance of the prediction are the shapes (reduced-rank regression: Izenman 1975): no K
+other shapes, driven by these features, come nearer to the prediction, so that joints get shapes by what these take off.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
-__all__ = ["Correctives", "features", "fit_correctives", "no_correctives"]
+from warpjld.baking.predicted import Prediction, predicted_errors
 
-_RIDGES = 10.0 ** np.arange(-6.0, 1.1, 0.5)  # strengths tried, relative to the features' mean square
+__all__ = ["PRODUCTS", "Correctives", "features", "fit_correctives", "no_correctives"]
+
 _DAMPING = 1e-2  # damping of inverses of nearly singular blended matrices (candy-wrapper artefacts)
-_SMALLEST_DRIVE = 0.01  # share of the strongest joint's contribution below which a joint's features are left out
-_PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+_SMALLEST_DRIVE = (
+    1e-4  # share of a joint's energy in a shape's weight, of the strongest joint's, below which it is none
+)
+PRODUCTS = tuple(chosen for degree in (1, 2, 3) for chosen in combinations_with_replacement(range(3), degree))
+"""Which of x, y, z of a quaternion each feature multiplies."""
+_FRAMES = 16  # frames mapped back at once, which bounds memory
+_COLUMNS = 30_000  # coordinates whose products are added up at once, likewise
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +37,12 @@ class Correctives:
 
     Attributes:
         shapes: Displacements in the bind pose [m], shape (K, V, 3).
-        drivers: Coefficient of every feature of every bone in a shape's weight, shape (K, B, 9).
-        ridge: Strength of the ridge regression chosen.
+        drivers: Coefficient of every feature of every bone in a shape's weight, shape (K, B, 19).
         span: Smallest and largest weight over the poses fitted to, zero included, shape (K, 2).
     """
 
     shapes: NDArray[np.float64]
     drivers: NDArray[np.float64]
-    ridge: float = 0.0
     span: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __len__(self) -> int:
@@ -49,17 +55,20 @@ class Correctives:
 
 def no_correctives(vertices: int, bones: int) -> Correctives:
     """An empty set of shapes."""
-    return Correctives(np.zeros((0, vertices, 3)), np.zeros((0, bones, 9)))
+    return Correctives(np.zeros((0, vertices, 3)), np.zeros((0, bones, len(PRODUCTS))))
 
 
 def features(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Features x, y, z, x², y², z², xy, xz, yz of quaternions (F, B, 4), shape (F, B, 9)."""
-    vector = turns[..., :3]
-    return np.concatenate([vector, np.stack([vector[..., a] * vector[..., b] for a, b in _PRODUCTS], -1)], -1)
+    """Features of quaternions (F, B, 4), shape (F, B, 19)."""
+    return np.stack([turns[..., list(chosen)].prod(axis=-1) for chosen in PRODUCTS], axis=-1)
 
 
 def fit_correctives(
-    errors: NDArray[np.float64], blended: NDArray[np.float64], turns: NDArray[np.float64], count: int
+    errors: NDArray[np.float64],
+    blended: NDArray[np.float32],
+    turns: NDArray[np.float64],
+    skin: csc_array,
+    count: int,
 ) -> Correctives:
     """Fit K = ``count`` shapes to the residual of blend skinning in F frames.
 
@@ -67,68 +76,48 @@ def fit_correctives(
         errors: Target minus skinned position [m], shape (F, V, 3).
         blended: Linear part of every vertex's blended transform, shape (F, V, 3, 3).
         turns: Rotations of the bones relative to their parents, shape (F, B, 4).
+        skin: Weight of every bone at every vertex, shape (V, B).
         count: Number of shapes, at most F.
     """
-    vertices = errors.shape[1]
-    normal = np.einsum("fvji,fvjk->fvik", blended, blended) + _DAMPING * np.eye(3)
-    right = np.einsum("fvji,fvj->fvi", blended, errors)
-    back = np.linalg.solve(normal, right[..., None])[..., 0] * (1.0 + _DAMPING)
-    rows = back.reshape(len(back), -1)
-    between = rows @ rows.T
+    back = np.empty(errors.shape, dtype=np.float32)
+    for start in range(0, len(errors), _FRAMES):
+        part = slice(start, start + _FRAMES)
+        normal = np.einsum("fvji,fvjk->fvik", blended[part], blended[part]) + _DAMPING * np.eye(3)
+        right = np.einsum("fvji,fvj->fvi", blended[part], errors[part])
+        back[part] = np.linalg.solve(normal, right[..., None])[..., 0] * (1.0 + _DAMPING)
     inputs = features(turns)
-    first = _reduced(rows, between, inputs, count)
-    # joints that hardly drive the K shapes must not disturb them: repeat the regression without their features
-    contribution = np.einsum("fbn,kbn->fbk", inputs, first.drivers) * np.linalg.norm(first.shapes, axis=1)
-    share = (contribution**2).sum(axis=(0, 2))
-    inputs[:, share < _SMALLEST_DRIVE * share.max()] = 0.0
-    found = _reduced(rows, between, inputs, count)
-    return Correctives(found.shapes.reshape(-1, vertices, 3), found.drivers, found.ridge, found.span)
+    found = predicted_errors(back, inputs, skin)
+    shapes = _strongest(found.errors.reshape(len(back), -1), count)
+    drivers = _drivers(found, inputs, shapes)
+    weights = np.einsum("fbn,kbn->fk", inputs, drivers, optimize=True)
+    span = np.column_stack([np.minimum(weights.min(axis=0), 0.0), np.maximum(weights.max(axis=0), 0.0)])
+    return Correctives(shapes.reshape(len(shapes), -1, 3), drivers, span)
 
 
-def _reduced(
-    rows: NDArray[np.float64], between: NDArray[np.float64], by_bone: NDArray[np.float64], count: int
-) -> Correctives:
-    """Reduced-rank ridge regression.
-
-    Args:
-        rows: Errors, shape (F, 3 V).
-        between: Their Gram matrix, shape (F, F).
-        by_bone: Features, shape (F, B, 9).
-        count: Largest rank K.
-
-    Returns:
-        Shapes, flattened to (K, 3 V), and their drivers.
-    """
-    frames = len(rows)
-    inputs = by_bone.reshape(frames, -1)
-    left, values, right_vectors = np.linalg.svd(inputs, full_matrices=False)
-    scale = float((values**2).sum()) / frames
-    ridge = min(_RIDGES * scale, key=lambda r: _left_out(left, values, r, between))
-    shrink = values / (values**2 + ridge)
-    hat = (left * (values * shrink)) @ left.T
-    spread, directions = np.linalg.eigh(hat @ between @ hat)
+def _strongest(rows: NDArray[np.float32], count: int) -> NDArray[np.float64]:
+    """At most ``count`` orthonormal directions (K, N) of largest variance, about zero, of rows (F, N)."""
+    between = np.zeros((len(rows), len(rows)))
+    for start in range(0, rows.shape[1], _COLUMNS):
+        block = rows[:, start : start + _COLUMNS].astype(np.float64)
+        between += block @ block.T
+    spread, directions = np.linalg.eigh(between)
     kept = np.argsort(-spread)[:count]
     kept = kept[spread[kept] > 1e-12 * max(float(spread.max()), 1e-300)]
-    length = np.sqrt(spread[kept])
-    shapes = ((hat @ directions[:, kept]) / length).T @ rows
-    drivers = ((right_vectors.T * shrink) @ (left.T @ (rows @ shapes.T))).T
-    drivers[:, ~inputs.any(axis=0)] = 0.0  # else rounding errors of what never moves, as of roots
-    weights = inputs @ drivers.T
-    span = np.column_stack([np.minimum(weights.min(axis=0), 0.0), np.maximum(weights.max(axis=0), 0.0)])
-    return Correctives(shapes, drivers.reshape(len(kept), *by_bone.shape[1:]), float(ridge), span)
+    mixing = (directions[:, kept] / np.sqrt(spread[kept])).T
+    return np.concatenate(
+        [mixing @ rows[:, start : start + _COLUMNS] for start in range(0, rows.shape[1], _COLUMNS)], axis=1
+    )
 
 
-def _left_out(
-    left: NDArray[np.float64], values: NDArray[np.float64], ridge: float, between: NDArray[np.float64]
-) -> float:
-    """Leave-one-out error: sum of squares where every frame is predicted from the others.
-
-    Args:
-        left: Left singular vectors of the features.
-        values: Their singular values.
-        ridge: Strength of the regression.
-        between: Gram matrix of the errors, shape (F, F).
-    """
-    hat = (left * (values**2 / (values**2 + ridge))) @ left.T
-    away = (np.eye(len(hat)) - hat) / np.maximum(1.0 - np.diag(hat), 1e-6)[:, None]
-    return float(np.einsum("ij,jk,ik->", away, between, away, optimize=True))
+def _drivers(found: Prediction, inputs: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients (K, B, 19) of the features (F, B, 19) in the weights of orthonormal shapes (K, 3 V); those of bones
+    that hardly drive a shape are zero."""
+    bones = inputs.shape[1]
+    drivers = np.zeros((len(shapes), bones, inputs.shape[2]))
+    by_vertex = shapes.reshape(len(shapes), -1, 3)
+    for part in found.parts:
+        along = by_vertex[:, part.vertices].reshape(len(shapes), -1)
+        drivers[:, part.drivers] += (along @ part.coefficients.T).reshape(len(shapes), len(part.drivers), -1)
+    energy = (np.einsum("fbn,kbn->fkb", inputs, drivers) ** 2).sum(axis=0)
+    drivers[energy < _SMALLEST_DRIVE * energy.max(axis=1, keepdims=True)] = 0.0
+    return drivers

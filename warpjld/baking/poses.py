@@ -22,7 +22,7 @@ _UNKNOWN = np.radians(30.0)  # largest angle of channels with wide, symmetric li
 _TURN = np.radians(20.0)  # rotation of single joints about the world's axes, since motion files do not respect limits
 _SHARES = (0.5, 1.0)  # shares of the limits in poses of single joints
 _ASIDE = 0.6  # share of the limits of all channels but flexion in random poses: they seldom reach them together
-_RANDOM = 200  # number of random poses
+_RANDOM = 400  # number of random poses
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpjld.baking.baked import Baked
+from warpjld.baking.correctives import PRODUCTS
 from warpjld.errors import InputError
 from warpjld.files.folders import make_folder
 from warpjld.files.whole_file import whole_file
@@ -157,7 +158,7 @@ def _drivers(baked: Baked, targets: _Targets) -> dict[str, Any]:
         shapes.append({"name": name, "offset": float(targets.offset[k]), "drivers": driven})
     return {
         "version": 1,
-        "features": ["x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz"],
+        "features": ["".join("xyz"[axis] for axis in chosen) for chosen in PRODUCTS],
         "axes": "world, Y up",
         "shapes": shapes,
     }
