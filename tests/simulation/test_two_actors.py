@@ -84,7 +84,7 @@ def test_hands_whose_bones_cross_at_the_start_are_refused() -> None:
         model = assemble_model(bodies, [], {}, scene.contact)
         left[up] = min((bone.left for bone in BoneClearance(model).between_actors(model, 0.0)), default=1.0)
         if up == 0.013:
-            with pytest.raises(InputError, match=r"the bone of \w+ index is .* mm inside the bones of .* begin farther"):
+            with pytest.raises(InputError, match=r"the bone of \w+ index is .* mm inside the bones of .* farther"):
                 check_model(model, scene.contact)
         else:
             check_model(model, scene.contact)

@@ -168,7 +168,7 @@ def test_an_open_surface_and_overlapping_parts_have_an_inside() -> None:
     assert (cup.project(np.array([[0.0, -0.02, 0.0]]), 0.0).distance < 0).all()
 
 
-@pytest.mark.parametrize("shift", [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.0, 0.3], [0.0, 0.0, -0.3], [0.4, 1.1, -0.2]])
+@pytest.mark.parametrize("shift", [[0, 0, 0], [0.3, 0, 0], [0, 0, 0.3], [0, 0, -0.3], [0.4, 1.1, -0.2]])
 def test_an_open_surface_faces_the_same_way_wherever_it_lies(shift: list[float]) -> None:
     """A cup without a lid, as flesh of a cut finger is, far from the origin."""
     cup = trimesh.creation.cylinder(0.01, 0.06)

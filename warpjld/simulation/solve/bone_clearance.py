@@ -107,7 +107,7 @@ class BoneClearance:
         return out
 
     def between_actors(self, model: ContactModel, time: float) -> list[TightBone]:
-        """Least relative thickness of the flesh between a digit's bones and another actor's at a time, where below 1."""
+        """Least relative thickness of flesh between a digit's bones and another actor's at a time, where below 1."""
         out = []
         for hand, other in permutations(model.hands, 2):
             nodes, digit, depth, names = self._bones[hand.name]
