@@ -35,6 +35,7 @@ class Places:
     between: wp.array(dtype=wp.int32)
     external: wp.array(dtype=wp.int32)
     rigid: wp.array(dtype=wp.int32)
+    whole: wp.array(dtype=wp.int32)
 
 
 @wp.func
@@ -103,6 +104,8 @@ def basis(
     else:
         y = internal_normal(a, places.ratio[v, 0], places, modified, f)
     x = wp.normalize(x)
+    if places.whole[v] != 0:
+        y = wp.normalize(y - wp.dot(x, y) * x)  # no shear
     return wp.matrix_from_cols(x, y, wp.normalize(wp.cross(x, y)))
 
 
@@ -189,7 +192,7 @@ def express(
     axes = basis(v, places, parameters, positions, original, modified, 0)
     local = wp.inverse(axes) * (rest[v] - origin(v, places, positions, 0))
     grown = wp.vec3(1.0)
-    if places.between[v] == 0:
+    if places.between[v] == 0 and places.whole[v] == 0:
         if places.external[v] != 0:
             grown = rounded(v, grown, places, parameters, flexion_ratio, 0)
         else:
@@ -226,7 +229,9 @@ def deform_paper(
     if hard >= 0:
         points_out[f, i] = positions[f, hard] + wp.quat_rotate(wp.normalize(rotations[f, hard]), local)
         return
-    if places.between[v] != 0:
+    if places.whole[v] != 0:
+        pass  # a nail or a bracelet: neither rounded nor swollen
+    elif places.between[v] != 0:
         # approaching neighbours: the scale factor's inflation (§4, R44, C3)
         apart = wp.length(foot(v, 1, places, positions, f) - foot(v, 0, places, positions, f))
         closer = wp.clamp(apart / virtual_length[v], 1.0e-3, 1.0)

@@ -164,6 +164,46 @@ def test_a_body_drawn_as_two_meshes_has_no_seam() -> None:
     np.testing.assert_array_equal(out[~rim], fields[~rim])
 
 
+def ring(radius: float, wire: float, height: float = 1.0, open_by: float = 0.0):
+    """A closed ring round z: a torus whose section is ``height`` times as high as wide."""
+    around, across = 40, 8
+    a = np.linspace(0.5 * open_by, 2.0 * np.pi - 0.5 * open_by, around, endpoint=open_by > 0.0)
+    b = np.arange(across) * 2.0 * np.pi / across
+    out = radius + wire * np.cos(b)
+    points = np.stack([np.outer(np.cos(a), out), np.outer(np.sin(a), out)], axis=2)
+    z = np.broadcast_to(height * wire * np.sin(b), (around, across))
+    faces = []
+    for i, k in np.ndindex(around if not open_by else around - 1, across):
+        j, n = (i + 1) % around, (k + 1) % across
+        faces += [[i * across + k, j * across + k, i * across + n], [i * across + n, j * across + k, j * across + n]]
+    if open_by:  # both ends are closed by fans
+        for end, step in ((0, 1), ((around - 1) * across, -1)):
+            faces += [[end, end + k, end + k + 1][::step] for k in range(1, across - 1)]
+    return np.dstack([points, z]).reshape(-1, 3), np.array(faces, dtype=np.int32)
+
+
+@pytest.mark.parametrize("turn", range(2))
+@pytest.mark.parametrize(
+    ("piece", "rigid"),
+    [
+        (ring(0.0155, 0.0012), True),  # a bracelet that hardly touches
+        (ring(0.0135, 0.0012, height=2.5), True),  # a watch's strap
+        (ring(0.0155, 0.0012, open_by=1.2), True),  # a bangle, open by 70°
+        (ring(0.0155, 0.0012, height=6.0), False),  # a cuff, longer than the limb is thick
+        (ball([0, 0.0085, -0.03], 0.02, (0.25, 0.02, 1.0)), False),  # a strip along the limb
+    ],
+    ids=["bracelet", "strap", "bangle", "cuff", "strip"],
+)
+def test_bands_round_a_limb_are_rigid_however_wide(piece, rigid: bool, turn: int) -> None:
+    tilted = Rotation.from_rotvec([0.25, 0.0, 0.0]).as_matrix() if rigid else np.eye(3)
+    moved = piece[0] @ tilted.T + ([0.0, 0.0, -0.03] if np.ptp(piece[0][:, 0]) > 0.02 else 0.0)
+    vertices, faces, of = together(FINGER, (moved, piece[1]))
+    rotation = Rotation.from_rotvec(np.array([0.3, 1.1, -0.7]) * turn).as_matrix()
+    found = shells(vertices @ rotation.T + turn, faces, LINES @ rotation.T + turn)
+    assert host_of(found, of).tolist() == [True, False]
+    assert whole_of(found, of).tolist() == [False, rigid]
+
+
 def test_what_is_rigid_stays() -> None:
     vertices, faces, piece = together(FINGER, ball([0, 0.008, -0.055], 0.005))
     rigid = np.where(piece == 1, 2, -1).astype(np.int32)

@@ -36,3 +36,10 @@ def test_a_thinner_place_counts_even_where_bones_are_farther_apart() -> None:
 def test_it_says_what_of_whom() -> None:
     one = TightBone("LEFT", "index", "the bone of middle", 0.16, 1.07e-3)
     assert one.text == "the bone of LEFT index is 1.1 mm from the bone of middle, 16 % of the flesh between them"
+
+
+def test_bones_of_two_actors_are_told() -> None:
+    one = TightBone("OTHER", "index", "the bones of BODY", 0.36, 5.4e-3)
+    assert one.text == "the bone of OTHER index is 5.4 mm from the bones of BODY, 36 % of the flesh between them"
+    other = TightBone("BODY", "", "the bones of OTHER", -0.1, -1e-3)
+    assert other.text == "a bone of BODY is 1 mm inside the bones of OTHER, which cannot give way"

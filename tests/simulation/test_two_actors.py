@@ -13,7 +13,11 @@ from warpjld.hand.kept import kept_hand
 from warpjld.rig import Rig
 from warpjld.script import Interpreter, Scene
 from warpjld.script.contact import SceneAnimation, run_contact
+from warpjld.simulation.bodies.flesh_body import build_flesh_body
+from warpjld.simulation.bodies.model import assemble_model
 from warpjld.simulation.bodies.segment_surface import segment_surface
+from warpjld.simulation.solve.bone_clearance import BoneClearance
+from warpjld.simulation.solve.checks import check_model
 from warpjld.simulation.solve.start_frame import find_start
 
 PADS = """
@@ -67,6 +71,25 @@ def test_index_pads_of_two_hands_press_each_other(tmp_path: Path) -> None:
     assert abs(one[1]) > 0.9 * np.linalg.norm(one)
     row = next(row for row in found.rows if (row.frame, row.actor, row.digit) == (4.0, "RIGHT", "index"))
     assert row.against == "LEFT"
+
+
+@pytest.mark.slow
+def test_hands_whose_bones_cross_at_the_start_are_refused() -> None:
+    """One index 13 mm up into the other; 4 mm are a matter of pressure, and nothing is between bones that are apart."""
+    left = {}
+    for up in (0.0, 0.004, 0.013):
+        scene = hands(PADS.replace("-0.04094", f"{up - 0.04094:.5f}"))
+        actors = SceneAnimation(scene).actors
+        bodies = [build_flesh_body(actors[name], flesh, 0.0)[0] for name, flesh in scene.contact.flesh.items()]
+        model = assemble_model(bodies, [], {}, scene.contact)
+        left[up] = min((bone.left for bone in BoneClearance(model).between_actors(model, 0.0)), default=1.0)
+        if up == 0.013:
+            with pytest.raises(InputError, match=r"the bone of \w+ index is .* mm inside the bones of .* farther"):
+                check_model(model, scene.contact)
+        else:
+            check_model(model, scene.contact)
+    assert left[0.0] == 1.0 > left[0.004] > 0.3
+    assert left[0.013] < 0.0
 
 
 @pytest.mark.slow

@@ -28,10 +28,12 @@ class Following:
             lie on others.
         bending: ``follow`` with zero rows on small shells, which move rigidly: a nail is neither rounded at a joint nor
             swollen by a muscle.
+        whole: Whether a vertex belongs to such a small shell, shape (V,).
     """
 
     follow: sp.csr_array
     bending: sp.csr_array
+    whole: NDArray[np.bool_]
 
     def of(self, fields: Fields) -> Fields:
         """Fields of the whole surface, from the diffused ones, of which only the skin's are used."""
@@ -67,5 +69,5 @@ def following(
     if len(np.unique(shell_numbers(faces, len(rigid))[used & (rigid < 0)])) <= 1:
         return None
     found = shells(vertices, faces, lines, rigid)
-    bends = ~found.whole[found.label] | (rigid >= 0)
-    return Following(found.follow, sp.csr_array(sp.diags_array(bends.astype(np.float64)) @ found.follow))
+    whole = found.whole[found.label] & (rigid < 0)
+    return Following(found.follow, sp.csr_array(sp.diags_array((~whole).astype(np.float64)) @ found.follow), whole)

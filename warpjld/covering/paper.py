@@ -76,7 +76,9 @@ class PaperCovering(Covering):
         """Coordinates of the vertices on their segment or palm pair, and their areas."""
         where = (self.surface.vertices, self.skeleton, self.fans, self.domains, self.parameters)
         found = paper_places(*where, self.anchors.rigid)
-        return found if self.following is None else found.taken_from(_followed(self.following.follow))
+        if self.following is None:
+            return found
+        return found.taken_from(_followed(self.following.follow), self.following.whole)
 
     def points(self, poses: Poses, vertices: ArrayLike, *, device: str = "cpu") -> NDArray[np.float32]:
         """Final positions of chosen vertices only [m], shape (F, n, 3) (R74)."""

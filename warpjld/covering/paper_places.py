@@ -31,6 +31,8 @@ class PaperPlaces:
         external: Whether it lies on the external side, shape (V,) (R45).
         rigid: Joint whose bone a rigid vertex follows, -1 for flesh, shape (V,); for rigid vertices the other
             attributes have no meaning.
+        whole: Whether it belongs to a shell that moves rigidly with the place beneath it, neither rounded nor swollen,
+            shape (V,).
     """
 
     ends: NDArray[np.int32]
@@ -41,13 +43,14 @@ class PaperPlaces:
     between: NDArray[np.bool_]
     external: NDArray[np.bool_]
     rigid: NDArray[np.int32]
+    whole: NDArray[np.bool_]
 
-    def taken_from(self, vertex: NDArray[np.int64]) -> PaperPlaces:
-        """Places copied to every vertex from another, shape (V,), for shells that lie on the skin and for coincident
-        borders (R18); rigid vertices keep their own."""
+    def taken_from(self, vertex: NDArray[np.int64], whole: NDArray[np.bool_]) -> PaperPlaces:
+        """Places copied to every vertex from another, shape (V,), for shells that lie on the skin, of which those of
+        ``whole`` (V,) move rigidly, and for coincident borders (R18); rigid vertices keep their own."""
         chosen = np.where((self.rigid >= 0) | (self.rigid[vertex] >= 0), np.arange(len(vertex)), vertex)
         moved = {name: getattr(self, name)[chosen] for name in ("segment", "ratio", "across", "between", "external")}
-        return replace(self, **moved)
+        return replace(self, **moved, whole=whole)
 
 
 def paper_places(
@@ -98,7 +101,8 @@ def paper_places(
     external = _height(vertices, table, segment, both, np.where(between, across, 0.0)) >= -tie
     muscle = np.array([fan.muscle for fan in groups for _ in fan.segments])
     rigid = np.full(count, -1, dtype=np.int32) if rigid is None else rigid
-    return PaperPlaces(ends, muscle, segment, both, across, between, external, rigid)
+    whole = np.zeros(count, dtype=bool)
+    return PaperPlaces(ends, muscle, segment, both, across, between, external, rigid, whole)
 
 
 def _palm_place(

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from warpjld.covering.bands import bands
 from warpjld.geometry.normals import vertex_normals
 from warpjld.geometry.rotations import unit
 from warpjld.runtime.query_mesh import query_mesh
@@ -39,9 +40,9 @@ class Shells:
         label: Shell of every vertex, shape (V,), numbered from 0; vertices without a face are shells of their own.
         host: Whether a shell is flesh around segments, shape (N,).
         lies: Whether a shell lies on a host, shape (N,): neither host nor rigid nor without faces.
-        whole: Whether a lying shell moves rigidly, shape (N,): it is small compared with the host's thickness, and no
-            border vertex lies on the host. All its rows of ``follow`` are equal, so with equal positions and
-            rotations, and no rounding or muscle, it moves rigidly.
+        whole: Whether a lying shell moves rigidly, shape (N,): it is small compared with the host's thickness, or a
+            closed band round the host (see ``bands``), and no border vertex lies on the host. All its rows of
+            ``follow`` are equal, so with equal positions and rotations, and no rounding or muscle, it moves rigidly.
         follow: Interpolation weights, sparse (V, V), rows non-negative and summing to one: ``follow @ X`` are fields of
             the whole surface for fields X of the hosts. Rows of hosts and rigid vertices are the identity's, except
             that coincident border vertices of hosts get their mean.
@@ -227,7 +228,9 @@ def _follow(
     middle = (mean @ vertices[lying]) / size[:, None]
     reach = np.zeros(number)
     np.maximum.at(reach, of, np.linalg.norm(vertices[lying] - middle[of], axis=1))
-    whole = lies & (reach <= _SMALL * (mean @ thick) / size)
+    host_thick = (mean @ thick) / size
+    around = bands(vertices[lying], of, unit(towards), host_thick)
+    whole = lies & ((reach <= _SMALL * host_thick) | (around & ~sheet))
     # shells with border vertices on the skin bend with it, so that they do not tear off
     sewn = border[lying] & (apart < _SEAM * float(np.linalg.norm(np.ptp(vertices[faces.ravel()], axis=0))))
     whole[of[sewn]] = False

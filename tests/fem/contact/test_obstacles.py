@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from warpjld.errors import InputError
 from warpjld.fem.contact.obstacles.barr import Barr
+from warpjld.fem.contact.obstacles.facets import Facets
 from warpjld.fem.contact.obstacles.meshes import Keyframed, RigidMesh
 from warpjld.fem.contact.obstacles.obstacle import Obstacle, standing
 from warpjld.fem.contact.obstacles.solids import Box, Cylinder, Plane, Sphere
@@ -165,6 +166,15 @@ def test_an_open_surface_and_overlapping_parts_have_an_inside() -> None:
     assert (both.project(np.array([[0.0, 0, 0], [0.01, 0, 0], [0.02, 0, 0]]), 0.0).distance < 0).all()
     cup = RigidMesh(vertices, faces[vertices[faces].mean(axis=1)[:, 1] < 0.04])
     assert (cup.project(np.array([[0.0, -0.02, 0.0]]), 0.0).distance < 0).all()
+
+
+@pytest.mark.parametrize("shift", [[0, 0, 0], [0.3, 0, 0], [0, 0, 0.3], [0, 0, -0.3], [0.4, 1.1, -0.2]])
+def test_an_open_surface_faces_the_same_way_wherever_it_lies(shift: list[float]) -> None:
+    """A cup without a lid, as flesh of a cut finger is, far from the origin."""
+    cup = trimesh.creation.cylinder(0.01, 0.06)
+    faces = cup.faces[cup.face_normals[:, 2] < 0.9]
+    found = Facets(cup.vertices + shift, faces).project(np.array([[0.0, 0.0, -0.02], [0.0, 0.0, -0.04]]) + shift)
+    assert found.distance == pytest.approx([-0.01, 0.01], rel=0.02)
 
 
 @pytest.mark.parametrize("name", [*SOLIDS, *MESHES])

@@ -13,6 +13,7 @@ from warpjld.simulation.animation import Animation
 from warpjld.simulation.bodies.flesh_body import FleshBody
 from warpjld.simulation.bodies.model import ContactModel
 from warpjld.simulation.bodies.surface_offset import outer_surface
+from warpjld.simulation.solve.bone_clearance import BoneClearance
 from warpjld.simulation.specification import (
     BondStrength,
     ContactSpecification,
@@ -98,8 +99,8 @@ def _check_share(grip: GripSpecification) -> None:
 
 
 def check_model(model: ContactModel, contact: ContactSpecification) -> None:
-    """Reject bonds across a gap, objects inside flesh, lifted objects that stand on others, and initial overlaps deeper
-    than the search distance of contact (R112).
+    """Reject bonds across a gap, objects inside flesh, lifted objects that stand on others, initial overlaps deeper
+    than the search distance of contact, and actors whose bones begin in each other (R112).
 
     Raises:
         InputError: With the command's line, if there is one.
@@ -124,6 +125,7 @@ def check_model(model: ContactModel, contact: ContactSpecification) -> None:
             if (flesh.project(np.asarray(vertices)).distance < 0.0).all():
                 raise InputError(f"{name} lies inside {hand.name}: nothing can press it out; move it out of the flesh")
         _refuse_deep(model, hand, surfaces)
+    _refuse_crossed(model)
 
 
 def _refuse_apart(surfaces: Mapping[str, Facets], bonded: BondStrength) -> None:
@@ -159,6 +161,22 @@ def _refuse_deep(model: ContactModel, hand: FleshBody, surfaces: Mapping[str, Fa
                 f"{hand.name} {digits}: {where}; with these elements it parts {1e3 * most:.2g} mm at most: begin "
                 "farther out, or take a larger ELEMENT"
             )
+
+
+def _refuse_crossed(model: ContactModel) -> None:
+    """Reject actors that begin so deep in each other that a bone of one lies in the other's bones: no flesh is left
+    between them that could give way.
+
+    Raises:
+        InputError: Names the digit and both actors.
+    """
+    found = BoneClearance(model).between_actors(model, 0.0) if len(model.hands) > 1 else []
+    worst = min(found, key=lambda bone: bone.left, default=None)
+    if worst is not None and worst.left <= 0.0:
+        raise InputError(
+            f"{worst.text}: they pass through each other at frame {model.start:g}, where contact begins; begin farther "
+            "apart"
+        )
 
 
 def _below(model: ContactModel, surfaces: dict[str, Facets], name: str) -> str:

@@ -51,7 +51,8 @@ class Facets:
 
     Args:
         vertices: [m], shape (v, 3).
-        faces: Triangles, anticlockwise seen from outside, shape (t, 3); reversed if they enclose a negative volume.
+        faces: Triangles, anticlockwise seen from outside, shape (t, 3); reversed if they enclose a negative volume
+            (an open surface, with the cone from its middle to its rim).
 
     Raises:
         InputError: Not finite, wrong shapes, indices out of range, or only triangles without area.
@@ -60,6 +61,7 @@ class Facets:
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points, triangles = checked_surface(vertices, faces)
         corners = points[triangles]
+        corners = corners - corners.mean(axis=(0, 1))  # what an open surface encloses depends on the origin
         if np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0.0:
             triangles = np.ascontiguousarray(triangles[:, ::-1])
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
