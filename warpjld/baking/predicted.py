@@ -20,9 +20,7 @@ from scipy.sparse import csc_array
 __all__ = ["PredictedSkin", "Prediction", "deforming_bones", "predicted_errors"]
 
 _RIDGES = 10.0 ** np.arange(-6.0, 1.1, 0.5)  # strengths tried, relative to the features' mean square
-_DEFORMS = (
-    1e-2  # a bone deforms a part if, alone, it causes this share of the energy of the strongest, a tenth of its RMS
-)
+_DEFORMS = 1e-2  # a bone deforms a part that, alone, it gives this share of the strongest's energy (a tenth of its RMS)
 _STILL = 1e-6  # |x, y, z| of a rotation below which a bone does not turn
 
 
